@@ -12,16 +12,6 @@ bench-doc: ## the same, written into docs/BENCHMARKS.md
 	@tools/setup.sh bench
 	@$(PYTHON) -m tools.bench.bench --out docs
 
-.PHONY: bench-vision
-bench-vision: ## count the instructions a pixel of the vision front end (valgrind); renders what it looks at
-	@tools/setup.sh bench
-	@$(PYTHON) -m tools.bench.bench_vision
-
-.PHONY: bench-learner
-bench-learner: ## count the instructions of learning on the robot (valgrind); renders what is learned first
-	@tools/setup.sh bench
-	@$(PYTHON) -m tools.bench.bench_learner
-
 .PHONY: bench-pictures
 bench-pictures: ## find objects beside OpenCV's HOG, a small network and AprilTag: PICTURES="DIR DIR"
 	@tools/setup.sh bench

@@ -143,7 +143,12 @@ static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
         for (int i = 0; i < SEEN; i++) {
             seen[i] = see((k * SEEN + i) % beacons);
         }
-        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.settings, &appearance, &mount, seen, SEEN, 0};
+        const bslam_sighting_frame_t frame = {.ekf = &slam.ekf,
+                                              .settings = &slam.settings,
+                                              .appearance = &appearance,
+                                              .mount = &mount,
+                                              .sightings = seen,
+                                              .count = SEEN};
         const uint32_t began = port_ticks();
         associate(&frame, records);
         ticks += port_ticks() - began;

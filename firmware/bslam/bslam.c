@@ -46,6 +46,12 @@ static void sum_members(const bslam_instance_t *robot, uint32_t sums[BSLAM_GUARD
 #if BSLAM_SMOOTHER
     sums[2] = bslam_guard_sum(0, &robot->smoother, sizeof robot->smoother);
 #endif
+#if BSLAM_HYPOTHESES_MAX > 1
+    const int count = robot->doubts.count;  // it may be what is damaged
+    const size_t alive = count > 0 && count < BSLAM_HYPOTHESES_MAX ? (size_t)count : 0;
+    sums[3] = bslam_guard_sum(0, &robot->doubts.count, sizeof robot->doubts.count);
+    sums[3] = bslam_guard_sum(sums[3], robot->doubts.others, alive * sizeof robot->doubts.others[0]);
+#endif
     (void)robot;
     (void)sums;
 }
@@ -71,13 +77,20 @@ static void check_members(bslam_instance_t *robot)
         const bslam_settings_t *settings = &robot->slam.settings;
         const bslam_status_t status =
             bslam_appearance_init(&robot->appearance, settings->seeds, settings->seed_count);
-        (void)status;  // the seeds were taken before
+        (void)status;                        // the seeds were taken before
+        bslam_slam_end_doubt(&robot->slam);  // what the others know of it is of before
     }
 #endif
 #if BSLAM_SMOOTHER
     if (!is_good[2]) {
         robot->smoother = (bslam_smoother_t){0};
         bslam_slam_restart_smoother(&robot->slam);
+    }
+#endif
+#if BSLAM_HYPOTHESES_MAX > 1
+    if (!is_good[3]) {
+        robot->doubts.count = 0;
+        bslam_slam_end_doubt(&robot->slam);
     }
 #endif
     sum_members(robot, robot->guard.members);
@@ -123,7 +136,7 @@ static int asks_for_more(const bslam_settings_t *settings)
     size_t offset = 0;
     if (!BSLAM_SMOOTHER && settings->filter == BSLAM_FILTER_SMOOTHER) {
         offset = offsetof(bslam_settings_t, filter);
-    } else if (!BSLAM_APPEARANCE && settings->association == BSLAM_ASSOCIATION_SVM) {
+    } else if (!BSLAM_APPEARANCE && bslam_weighs_looks(settings)) {
         offset = offsetof(bslam_settings_t, association);
     } else if (!BSLAM_RECOVERY && settings->recovery != 0) {
         offset = offsetof(bslam_settings_t, recovery);
@@ -148,12 +161,16 @@ static bslam_status_t begin_members(bslam_instance_t *robot)
 #if BSLAM_APPEARANCE
     const bslam_settings_t *settings = &robot->slam.settings;
     status = bslam_appearance_init(&robot->appearance, settings->seeds, settings->seed_count);
-    if (settings->association == BSLAM_ASSOCIATION_SVM) {
+    if (bslam_weighs_looks(settings)) {
         bslam_slam_attach_appearance(&robot->slam, &robot->appearance);
     }
 #endif
 #if BSLAM_SMOOTHER
     bslam_slam_attach_smoother(&robot->slam, &robot->smoother);
+#endif
+#if BSLAM_HYPOTHESES_MAX > 1
+    robot->doubts.count = 0;
+    bslam_slam_attach_doubts(&robot->slam, &robot->doubts);
 #endif
     return status;
 }
@@ -266,6 +283,11 @@ bslam_health_t bslam_health(const bslam_t *robot)
 #if BSLAM_RECOVERY
     health.state = bslam_recovery_state(&instance->recovery, &instance->slam);
 #endif
+    health.hypotheses = 1 + bslam_slam_doubts(&instance->slam);
+    health.lead_nats = bslam_slam_lead(&instance->slam);
+    if (health.state == BSLAM_RECOVERY_FOLLOWING && health.hypotheses > 1) {
+        health.state = BSLAM_RECOVERY_DOUBTING;
+    }
     return health;
 }
 

@@ -135,15 +135,18 @@ void bslam_pose_covariance(const bslam_t *robot, bslam_real_t lower[6]);
 
 typedef enum bslam_recovery_state {
     BSLAM_RECOVERY_FOLLOWING = 0,  ///< all is well
-    BSLAM_RECOVERY_DOUBTING,       ///< sightings contradict the pose
+    BSLAM_RECOVERY_DOUBTING,       ///< sightings contradict the pose, or may show one beacon or another
     BSLAM_RECOVERY_LOST            ///< the pose is unknown
 } bslam_recovery_state_t;
 
 typedef struct bslam_health {
     bslam_recovery_state_t state;
-    bool is_frozen;        ///< the map: no beacon is added, learned or taken out by itself
-    int32_t beacons;       ///< in the map, tentative ones included
-    int32_t bad_sighting;  ///< for which the last frame was refused; -1: none in particular
+    bool is_frozen;          ///< the map: no beacon is added, learned or taken out by itself
+    int32_t beacons;         ///< in the map, tentative ones included
+    int32_t bad_sighting;    ///< for which the last frame was refused; -1: none in particular
+    int32_t hypotheses;      ///< of which beacons were seen: 1, or more while that is in doubt
+    bslam_real_t lead_nats;  ///< log odds of the one in force against the next best, which may be below 0; 0
+                             ///< where there is no other
 } bslam_health_t;
 
 /// How the robot is doing. O(1).
@@ -215,6 +218,7 @@ typedef struct bslam_slam_counters {
     uint32_t unmappable;        ///< of these, of a class that is not mappable
     uint32_t deferred;          ///< left undecided, or of a tentative beacon
     uint32_t removed;           ///< tentative beacons taken out
+    uint32_t retired;           ///< beacons taken out because another was in the same place
     uint32_t settled;           ///< rays that became points
     uint32_t frozen;            ///< of the rejected, new in a frozen map
     uint32_t insane;  ///< times the state was found not finite or with a negative variance: must stay 0
@@ -236,7 +240,6 @@ typedef struct bslam_appearance_counters {
     uint32_t trained;  ///< sightings that a classifier was trained with
     uint32_t unsure;   ///< matches that none was trained with, because they may be wrong
     uint32_t shared;   ///< times that a beacon was found to look like another and took its classifier
-    uint32_t retired;  ///< beacons taken out because another was in the same place
     uint32_t missed;   ///< beacons taken out because they were missed from where they had been seen
     uint32_t parted;   ///< times that a beacon got a classifier of its own again
     uint32_t no_slot;  ///< beacons that got no classifier when they were first seen: none was free

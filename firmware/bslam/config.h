@@ -59,12 +59,13 @@
 #error "BSLAM_APPEARANCE is 0 or 1"
 #endif
 
-/// Signatures that a classifier keeps of its beacon, 80 bytes each.
-#ifndef BSLAM_SAMPLES_PER_CLASSIFIER
-#define BSLAM_SAMPLES_PER_CLASSIFIER 16
+/// Hypotheses that may be followed at once while it is in doubt which beacon is seen (setting `hypotheses`):
+/// a filter each. 1: what is decided once stands.
+#ifndef BSLAM_HYPOTHESES_MAX
+#define BSLAM_HYPOTHESES_MAX (BSLAM_APPEARANCE ? 2 : 1)
 #endif
-#if BSLAM_SAMPLES_PER_CLASSIFIER < 2 || BSLAM_SAMPLES_PER_CLASSIFIER > 64
-#error "BSLAM_SAMPLES_PER_CLASSIFIER is 2 to 64"
+#if BSLAM_HYPOTHESES_MAX < 1 || BSLAM_HYPOTHESES_MAX > 8
+#error "BSLAM_HYPOTHESES_MAX is 1 to 8"
 #endif
 
 /// 1: the bearing-only smoother (setting `filter` = 2).
@@ -102,6 +103,14 @@
 #error "BSLAM_SMOOTHER_NODES_MAX is a quarter of BSLAM_BEACONS_MAX at least"
 #endif
 
+/// Signatures that a classifier keeps of its beacon, 80 bytes each.
+#ifndef BSLAM_SAMPLES_PER_CLASSIFIER
+#define BSLAM_SAMPLES_PER_CLASSIFIER 16
+#endif
+#if BSLAM_SAMPLES_PER_CLASSIFIER < 2 || BSLAM_SAMPLES_PER_CLASSIFIER > 64
+#error "BSLAM_SAMPLES_PER_CLASSIFIER is 2 to 64"
+#endif
+
 /// One classifier a beacon.
 #ifndef BSLAM_LEARNER_SLOTS
 #define BSLAM_LEARNER_SLOTS BSLAM_BEACONS_MAX
@@ -111,11 +120,6 @@
 /// them, 30 to 40, or training does not settle.
 #ifndef BSLAM_NEGATIVES_MAX
 #define BSLAM_NEGATIVES_MAX 96
-#endif
-
-/// Dual steps of one training. A classifier that has not converged by then is trained again after the others.
-#ifndef BSLAM_LEARNER_STEPS_MAX
-#define BSLAM_LEARNER_STEPS_MAX 220
 #endif
 
 /// Samples have 8 bits a feature; float32 in the double-precision build, four times the RAM.

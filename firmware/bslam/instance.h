@@ -3,6 +3,7 @@
 #define BSLAM_INSTANCE_H
 
 #include "bslam/bslam.h"
+#include "bslam/slam/doubt.h"
 #include "bslam/slam/slam.h"
 #if BSLAM_RECOVERY
 #include "bslam/recovery/recovery.h"
@@ -27,6 +28,9 @@ typedef struct bslam_instance {
 #endif
 #if BSLAM_SMOOTHER
     bslam_smoother_t smoother;
+#endif
+#if BSLAM_HYPOTHESES_MAX > 1
+    bslam_doubts_t doubts;
 #endif
 } bslam_instance_t;
 

@@ -125,16 +125,14 @@ static void set_commanded(bslam_settings_t *settings)
 }
 
 /// What is partly hidden is measured as if it were whole: a few sightings in a hundred err by many times what
-/// they say. Distances are so doubtful that position alone fits too much: appearance counts twice, new
-/// beacons are expected less, and the viewpoint tells nothing.
+/// they say. Distances are so doubtful that position alone fits too much: appearance counts twice, and new
+/// beacons are expected less.
 static void set_camera(bslam_settings_t *settings)
 {
     settings->huber_d = 1;
     settings->gate_d2 = 9;
     settings->appearance_weight = 2;
     settings->new_per_m2 = BSLAM_R(0.003);
-    settings->viewpoint_low = 0;
-    settings->viewpoint_high = 0;
     if (settings->association != BSLAM_ASSOCIATION_KNOWN) {
         // The detector believes in things that are no beacon, mostly for a few metres of travel: a beacon
         // counts once it was seen from ten places, and nothing is thrown away.

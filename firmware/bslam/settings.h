@@ -63,7 +63,8 @@ extern "C" {
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     REAL(gate_d2, 13.8, 0.0, 1e6, "squared Mahalanobis distance of the gate (13.8: one in 1000; 0: none)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \
-    INTEGER(association, 0, 0, 4, "0 known, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint") \
+    INTEGER(association, 0, 0, 8, "0 known, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint, " \
+                                  "5 position, 6 nearest sample, 7 centroid, 8 both of 3 and 6") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
     REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, bearing-only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \
@@ -120,7 +121,11 @@ enum {
     BSLAM_ASSOCIATION_NEAREST = 1,
     BSLAM_ASSOCIATION_MAHALANOBIS = 2,
     BSLAM_ASSOCIATION_SVM = 3,
-    BSLAM_ASSOCIATION_JOINT = 4
+    BSLAM_ASSOCIATION_JOINT = 4,
+    BSLAM_ASSOCIATION_POSITION = 5,
+    BSLAM_ASSOCIATION_NEAREST_SAMPLE = 6,
+    BSLAM_ASSOCIATION_CENTROID = 7,
+    BSLAM_ASSOCIATION_BOTH = 8
 };
 
 /// Values of a signature, by which a detector tells how a thing looks.

@@ -20,9 +20,9 @@
 #define BSLAM_SIZE_EKF \
     (BSLAM_SIZE_REAL * (BSLAM_SIZE_STATE * 2 + (BSLAM_SIZE_BODY + 4) * 14 + \
                         BSLAM_SIZE_BODY * (BSLAM_SIZE_BODY + 4) / 2 + 4) + \
-     BSLAM_BEACONS_MAX * (56 + 6 * BSLAM_SIZE_REAL) + 48)
+     BSLAM_BEACONS_MAX * (64 + 6 * BSLAM_SIZE_REAL) + 48)
 /// The values of the settings.
-#define BSLAM_SIZE_SETTINGS (83 * BSLAM_SIZE_REAL + 88 + 2 * BSLAM_SIZE_POINTER)
+#define BSLAM_SIZE_SETTINGS (66 * BSLAM_SIZE_REAL + 64 + 2 * BSLAM_SIZE_POINTER)
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
@@ -31,7 +31,7 @@
 
 #define BSLAM_SIZE_RECOVERY \
     (BSLAM_RECOVERY * ((BSLAM_SIZE_REAL + BSLAM_SIZE_POINTER > 8 ? 496 : 416) + 124 * BSLAM_SIZE_REAL))
-#define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 44 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
+#define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 48 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
 
 /// A classifier: its list of negatives, its weights, its samples.
 #define BSLAM_SIZE_SAMPLE (BSLAM_SAMPLE_FLOAT ? 288 : 72)
@@ -43,9 +43,8 @@
     (848 + (BSLAM_SAMPLE_FLOAT ? 288 : 144) + BSLAM_SIZE_SAMPLES + \
      14 * (BSLAM_SAMPLES_PER_CLASSIFIER + BSLAM_NEGATIVES_MAX))
 #define BSLAM_SIZE_APPEARANCE \
-    (BSLAM_APPEARANCE * \
-     (BSLAM_BEACONS_MAX * (56 + 2 * BSLAM_SIZE_REAL) + BSLAM_LEARNER_SLOTS * BSLAM_SIZE_CLASSIFIER + \
-      BSLAM_SIZE_SAMPLES * BSLAM_SIZE_SAMPLE + BSLAM_SIZE_TRAINING + 104))
+    (BSLAM_APPEARANCE * (BSLAM_BEACONS_MAX * 44 + BSLAM_LEARNER_SLOTS * BSLAM_SIZE_CLASSIFIER + \
+                         BSLAM_SIZE_SAMPLES * BSLAM_SIZE_SAMPLE + BSLAM_SIZE_TRAINING + 104))
 
 /// The smoother: two filters, and the nodes of the path.
 #define BSLAM_SIZE_SMOOTHER \
@@ -57,9 +56,15 @@
       BSLAM_BEACONS_MAX * ((BSLAM_REAL_DOUBLE ? 24 : 20) + 8 * BSLAM_SIZE_REAL) + 42 * BSLAM_SIZE_REAL + \
       96))
 
+/// Hypotheses besides the one in force: a filter each, what it knows of its beacons, and costs.
+#define BSLAM_SIZE_DOUBTS \
+    ((BSLAM_HYPOTHESES_MAX - 1) * (BSLAM_SIZE_EKF + 44 * BSLAM_BEACONS_MAX + \
+                                   (BSLAM_SIGHTINGS_MAX + 7) * BSLAM_SIZE_REAL + BSLAM_SIGHTINGS_MAX + 16) + \
+     8)
+
 #define BSLAM_BYTES \
-    ((BSLAM_SIZE_PIPELINE + BSLAM_SIZE_RECOVERY + BSLAM_SIZE_GUARD + BSLAM_SIZE_APPEARANCE + \
-      BSLAM_SIZE_SMOOTHER + 39) / \
+    ((BSLAM_SIZE_PIPELINE + BSLAM_SIZE_DOUBTS + BSLAM_SIZE_RECOVERY + BSLAM_SIZE_GUARD + \
+      BSLAM_SIZE_APPEARANCE + BSLAM_SIZE_SMOOTHER + 39) / \
      8 * 8)
 
 /// Differs where sizes do, so that library and application notice: bslam_init.
@@ -75,7 +80,7 @@
     BSLAM_SIZES_MIX( \
         BSLAM_SIZES_MIX( \
             BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_FEW, BSLAM_RECOVERY), BSLAM_GUARD), \
-                            BSLAM_APPEARANCE *BSLAM_SAMPLES_PER_CLASSIFIER), \
+                            BSLAM_APPEARANCE *BSLAM_SAMPLES_PER_CLASSIFIER + 64 * BSLAM_HYPOTHESES_MAX), \
             BSLAM_APPEARANCE *BSLAM_NEGATIVES_MAX), \
         BSLAM_SMOOTHER *BSLAM_SMOOTHER_NODES_MAX)
 

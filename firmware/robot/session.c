@@ -92,7 +92,7 @@ static void report_sighting(session_t *session, int64_t time_us, int number)
     begin_report(session, &out, SESSION_SIGHTED, time_us);
     bslam_link_put_u8(&out, (uint8_t)number);
     record_put_sighting(&out, &robot->camera.sightings[number],
-                        robot->in_force.association == BSLAM_ASSOCIATION_SVM);
+                        robot->in_force.association >= BSLAM_ASSOCIATION_SVM);
     send(session, &out);
 }
 

@@ -12,7 +12,18 @@ from bslam.errors import BslamError
 from bslam.log import Log, Robot
 
 OBSERVATIONS = ("distance", "direction")
-ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
+ASSOCIATIONS = (
+    "known",
+    "nearest",
+    "mahalanobis",
+    "svm",
+    "joint",
+    "position",
+    "nearest-sample",
+    "centroid",
+    "both",
+)
+BY_APPEARANCE = ("svm", "nearest-sample", "centroid", "both")
 FILTERS = ("standard", "invariant", "smoother")
 MOTIONS = ("euler", "arc")
 ALIGNMENTS = ("none", "rigid", "similarity")
@@ -130,7 +141,7 @@ def recovery_of(options: RunOptions) -> str:
         return options.recovery
     if options.kept_map is not None:
         return "carried"
-    return "growing" if options.association == "svm" else "off"
+    return "growing" if options.association in BY_APPEARANCE else "off"
 
 
 def odometry_lead_us(options: RunOptions, log: Log) -> int:

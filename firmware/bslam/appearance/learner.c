@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-// Trainings that a classifier may ask for itself when BSLAM_LEARNER_STEPS_MAX did not suffice.
+// Trainings that a classifier may ask for itself when its steps did not suffice.
 enum { AGAIN = 20 };
 
 static bool exists(const bslam_learner_t *learner, int32_t classifier)

@@ -51,6 +51,20 @@ float bslam_sample_distance2(const bslam_sample_t *a, const bslam_sample_t *b)
     return (float)sum;
 }
 
+float bslam_sample_middle_distance2(const bslam_sample_t *others, int32_t count, const bslam_sample_t *b)
+{
+    float squares = 0.0f;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        float sum = 0.0f;
+        for (int32_t k = 0; k < count; k++) {
+            sum += (float)others[k].q[i];
+        }
+        const float difference = sum / (float)count - (float)b->q[i];
+        squares += difference * difference;
+    }
+    return squares;
+}
+
 float bslam_sample_decide(const bslam_weights_t *weights, const bslam_sample_t *sample)
 {
     sum_t sum = 0;

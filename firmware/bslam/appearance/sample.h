@@ -44,6 +44,9 @@ static inline void bslam_sample_unpack(const bslam_sample_t *restrict sample,
 /// Squared distance of two samples, in units of q.
 float bslam_sample_distance2(const bslam_sample_t *a, const bslam_sample_t *b);
 
+/// The same to the middle of count >= 1 others.
+float bslam_sample_middle_distance2(const bslam_sample_t *others, int32_t count, const bslam_sample_t *b);
+
 /// w . q, exact for 8-bit samples but for two roundings.
 float bslam_sample_decide(const bslam_weights_t *weights, const bslam_sample_t *sample);
 

@@ -16,6 +16,9 @@ static const float ALPHAS = 65535.0f;
 static const float LOWEST = -1.3f;
 static const float BINS_PER_UNIT = 40.0f;
 
+// Of one training. A classifier that has not converged by then is trained again after the others.
+enum { STEPS_MAX = 220 };
+
 enum {
     NO_NEGATIVE = 0,  // bin of what is below LOWEST, or not looked at
     HARDEST = BSLAM_BINS - 1,
@@ -242,7 +245,7 @@ static void choose(bslam_learner_t *learner, const bslam_samples_t *samples)
     bslam_training_t *training = &learner->training;
     if (training->block >= block_count(learner)) {
         training->stage = BSLAM_STAGE_SOLVE;
-        training->steps_left = BSLAM_LEARNER_STEPS_MAX;
+        training->steps_left = STEPS_MAX;
         return;
     }
     const int32_t first = training->block * BSLAM_PER_CLASSIFIER;

@@ -229,8 +229,12 @@ bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings)
         [BSLAM_ASSOCIATION_KNOWN] = bslam_associate_known,
         [BSLAM_ASSOCIATION_NEAREST] = bslam_associate_nearest,
         [BSLAM_ASSOCIATION_MAHALANOBIS] = bslam_associate_mahalanobis,
-        [BSLAM_ASSOCIATION_SVM] = BSLAM_APPEARANCE ? bslam_associate_svm : NULL,  // which bslam_init refuses
+        [BSLAM_ASSOCIATION_SVM] = bslam_associate_likely,
         [BSLAM_ASSOCIATION_JOINT] = bslam_associate_joint,
+        [BSLAM_ASSOCIATION_POSITION] = bslam_associate_likely,
+        [BSLAM_ASSOCIATION_NEAREST_SAMPLE] = bslam_associate_likely,
+        [BSLAM_ASSOCIATION_CENTROID] = bslam_associate_likely,
+        [BSLAM_ASSOCIATION_BOTH] = bslam_associate_likely,
     };
     return methods[settings->association];
 }

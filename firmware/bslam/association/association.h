@@ -19,14 +19,15 @@ typedef enum bslam_verdict {
 typedef struct bslam_match {
     bslam_verdict_t verdict;
     bslam_reason_t reason;
-    int32_t beacon;           ///< index into the map for a match, else -1
-    bslam_real_t distance2;   ///< to the chosen beacon in the method's own measure; negative: not computed
-    bslam_real_t score;       ///< svm: log odds of that beacon against a new one; else 0
-    bslam_real_t view_score;  ///< svm: the best one without again_odds since that beacon came into view
-    bslam_real_t lead;        ///< svm: by how much the score leads that of any other beacon, and of a new one
-    bool sure;                ///< svm: sure enough to learn from; else false
+    int32_t beacon;            ///< index into the map for a match, else -1
+    bslam_real_t distance2;    ///< to the chosen beacon in the method's own measure; negative: not computed
+    bslam_real_t score;        ///< log odds of that beacon against a new one; new: of the best one
+    bslam_real_t log_density;  ///< ln N(y; 0, S) given the matches before it, or the density of new ones
+    bslam_real_t looks;        ///< log odds by appearance and class
+    bslam_real_t lead;         ///< by how much the choice leads any other
+    bool is_match;             ///< within a method: it has a beacon that it may be
+    bool sure;                 ///< enough to learn from
     bool range_used;  ///< within a frame: the distance has said where on a ray the beacon is, or does not fit
-    int32_t delayed_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
 } bslam_match_t;
 
 /// All that is known of one sighting on its way through a frame: each stage fills in its own part.
@@ -37,6 +38,14 @@ typedef struct bslam_record {
     bslam_innovation_t innovation;  ///< of what is fused
 } bslam_record_t;
 
+/// In place of a beacon: a new one.
+#define BSLAM_CHOICE_NEW (-1)
+
+/// What a hypothesis may not choose: MATH "Which beacon is it".
+typedef struct bslam_bar {
+    int sighting, beacon;
+} bslam_bar_t;
+
 /// All a method may look at.
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
@@ -46,6 +55,8 @@ typedef struct bslam_sighting_frame {
     const bslam_sighting_t *sightings;
     int count;
     int64_t time_us;
+    const bslam_bar_t *bar;  ///< by likelihood; NULL: all is allowed
+    bool is_exact;           ///< densities are those given all matches before, whatever that costs
 } bslam_sighting_frame_t;
 
 /// Decides for every sighting of the frame: the match in records[0..count). A beacon is matched at most once
@@ -62,9 +73,9 @@ void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_record_t
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
 void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
-/// The paper's two steps: candidates by position, then classifiers decide. Without appearance or signatures
-/// by position alone. O(count * beacons), and again where two sightings want one beacon.
-void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_record_t *records);
+/// By likelihood: where a beacon is seen, given the frame's other matches, and how it looks, as far as that
+/// is known. O(count * beacons), and again where a match makes others clearer.
+void bslam_associate_likely(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// Joint compatibility branch and bound: the pairing that explains the most sightings together. At most
 /// BSLAM_CONDITIONAL_MAX sightings are paired together, and joint_nodes choices are tried for each such

@@ -1,6 +1,6 @@
 /// Innovations conditional on others of the same frame: where the robot errs, all of a frame err together, so
-/// one match makes the rest much surer. A growing Cholesky factor of their joint covariance. MATH "Position
-/// and appearance".
+/// one match makes the rest much surer. A growing Cholesky factor of their joint covariance. MATH "Which
+/// beacon is it".
 #ifndef BSLAM_ASSOCIATION_CONDITIONAL_H
 #define BSLAM_ASSOCIATION_CONDITIONAL_H
 

@@ -7,8 +7,7 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     *match = (bslam_match_t){.verdict = BSLAM_VERDICT_REJECT,
                              .reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS,
                              .beacon = -1,
-                             .distance2 = -1,
-                             .delayed_for = -1};
+                             .distance2 = -1};
     return mappable;
 }
 

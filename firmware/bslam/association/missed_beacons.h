@@ -1,6 +1,6 @@
 /// Beacons that are there no longer, with nothing in their place. The core knows no walls and no field of
-/// view; it knows from where each beacon was seen, and misses it where it stands there again. MATH "Position
-/// and appearance".
+/// view; it knows from where each beacon was seen, and misses it where it stands there again. MATH "Which
+/// beacon is it".
 #ifndef BSLAM_ASSOCIATION_MISSED_BEACONS_H
 #define BSLAM_ASSOCIATION_MISSED_BEACONS_H
 

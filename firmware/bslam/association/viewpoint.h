@@ -1,4 +1,4 @@
-/// From where the robot sees a beacon of the map. MATH "Position and appearance".
+/// From where the robot sees a beacon of the map. MATH "Which beacon is it".
 #ifndef BSLAM_ASSOCIATION_VIEWPOINT_H
 #define BSLAM_ASSOCIATION_VIEWPOINT_H
 

@@ -68,7 +68,10 @@ typedef struct bslam_beacon {
     uint8_t beacon_class;
     uint8_t class_lead;        ///< by how many votes it leads, slam/beacon_scale.c
     uint8_t distance_lead;     ///< by how many more its distances fitted than did not
+    uint8_t alone;             ///< how often it was seen without near_uid, or that without it
+    uint8_t ousted;            ///< how many beacons were retired for being in this one's place
     bool has_scores;           ///< of its sightings
+    uint32_t near_uid;         ///< an older beacon in the same place
     bslam_real_t score_sum;    ///< what these say for its being a beacon at all
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
     bslam_real_t last_bearing, last_range;  ///< innovations, in standard deviations of their noise

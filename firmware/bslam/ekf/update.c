@@ -240,6 +240,35 @@ static void fill_rows(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, cons
     }
 }
 
+/// Three degrees: below that an arc differs from its tangent by less than the noise of any distance.
+static const bslam_real_t BENT_HEADING_VAR_RAD2 = BSLAM_R(0.0027);
+
+static bslam_real_t squared(bslam_real_t x)
+{
+    return x * x;
+}
+
+/// A robot whose heading was in doubt while it moved stands somewhere on an arc, and the covariance has that
+/// arc's tangent. How far they are apart counts as noise, to second order. MATH "Which beacon is it". Not in
+/// the paper's equations.
+static void bend_by_heading(const bslam_ekf_t *ekf, bslam_real_t range_m, bslam_innovation_t *innovation)
+{
+    const bslam_real_t variance = bslam_ekf_covariance(ekf, BSLAM_STATE_THETA, BSLAM_STATE_THETA);
+    if (variance < BENT_HEADING_VAR_RAD2) {
+        return;
+    }
+    const bslam_row_t heading = {.base = {[BSLAM_STATE_THETA] = 1},
+                                 .sensor_at = innovation->bearing_row.sensor_at,
+                                 .sensor_dim = innovation->bearing_row.sensor_dim};
+    const bslam_row_t rows[] = {innovation->range_row, innovation->bearing_row};
+    bslam_real_t with_heading[2];
+    bslam_ekf_row_covariances(ekf, &heading, rows, 2, with_heading);
+    const bslam_real_t turn =
+        with_heading[1] / variance;  // by an error of the heading of 1; -1 where it stood
+    innovation->range_var_m2 += BSLAM_R(0.75) * squared(range_m * with_heading[1] * (1 + turn));
+    innovation->bearing_var_rad2 += BSLAM_R(0.75) * squared(with_heading[0] / range_m * (1 + 2 * turn));
+}
+
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                     const bslam_pose_t *told, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
@@ -269,6 +298,9 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
         const bslam_real_t range_m = bslam_ekf_range_scale(ekf) * seen.range_m;
         innovation->range_m = sighting->range_m - range_m;
         innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, range_m);
+        if (settings->filter != BSLAM_FILTER_STANDARD) {
+            bend_by_heading(ekf, seen.range_m, innovation);
+        }
     }
     return BSLAM_OK;
 }

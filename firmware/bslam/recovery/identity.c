@@ -29,7 +29,7 @@ static int find_classifier(const bslam_slam_t *slam, const bslam_sample_t *sampl
     float best_value = RECOGNISE_VALUE;
     float next_value = RECOGNISE_VALUE - RECOGNISE_LEAD;
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, &slam->settings, b, sample);
+        const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, b, sample);
         if (opinion.weight < RECOGNISE_WEIGHT || (best >= 0 && share_classifier(slam, b, best))) {
             continue;
         }
@@ -104,7 +104,7 @@ static bool is_known(const bslam_slam_t *slam, int beacon)
     static const bslam_sample_t ANY = {{0}};
     return slam->settings.association == BSLAM_ASSOCIATION_KNOWN ||
            (bslam_slam_learns(slam) &&
-            bslam_appearance_ask(slam->appearance, &slam->settings, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
+            bslam_appearance_ask(slam->appearance, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
 }
 
 bool bslam_is_findable(const bslam_slam_t *slam)

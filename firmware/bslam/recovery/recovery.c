@@ -440,9 +440,9 @@ static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam
 /// Notes when something began in the map. What a kept map was loaded with did not.
 static void note_growth(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
 {
-    if (recovery->next_uid != slam->ekf.next_uid) {
-        recovery->next_uid = slam->ekf.next_uid;
-        recovery->has_grown = slam->counters.added > 0;
+    if (recovery->added != slam->counters.added) {
+        recovery->added = slam->counters.added;
+        recovery->has_grown = true;
         recovery->grew_us = time_us;
     }
 }

@@ -35,7 +35,7 @@ typedef struct bslam_recovery {
     bool several;             ///< others have contradicted, too
     int32_t undecided;        ///< frames since then that said neither
     int32_t silent;           ///< frames since one contradicted in which nothing was recognised
-    uint32_t next_uid;        ///< of the map, as of the last frame
+    uint32_t added;           ///< beacons begun in the map, as of the last frame
     bool has_grown;           ///< something has begun in it,
     int64_t grew_us;          ///< the last time then
     bool has_contradicted;    ///< one did while the map grew, of this doubt,

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "base/scalar.h"
+#include "bslam/slam/doubt.h"
 #include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
@@ -12,6 +13,7 @@ static const int64_t WATCH_US = INT64_C(1000000);
 static void resume(bslam_slam_t *slam, bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
 {
     bslam_slam_predict_until(slam, 0);
+    bslam_slam_end_doubt(slam);
     bslam_ekf_resume(&slam->ekf, &slam->settings, position_sd_m * position_sd_m,
                      heading_sd_rad * heading_sd_rad);
     bslam_slam_restart_smoother(slam);

@@ -40,13 +40,18 @@ static bslam_real_t factor_of(const bslam_autocorrelation_t *noise)
                                : 1;
 }
 
+bslam_real_t bslam_slam_evidence_share(const bslam_slam_t *slam)
+{
+    const bslam_real_t by_bearing = factor_of(&slam->bearing_noise), by_range = factor_of(&slam->range_noise);
+    return 1 / (by_bearing > by_range ? by_bearing : by_range);
+}
+
 void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count)
 {
-    if (slam->settings.correlation_m >= 0) {
-        return;
-    }
     // Those of now, so that the order within a frame does not matter.
-    const bslam_real_t by_bearing = factor_of(&slam->bearing_noise), by_range = factor_of(&slam->range_noise);
+    const bool is_shown = slam->settings.correlation_m < 0;
+    const bslam_real_t by_bearing = is_shown ? factor_of(&slam->bearing_noise) : 1;
+    const bslam_real_t by_range = is_shown ? factor_of(&slam->range_noise) : 1;
     bslam_real_t bearings = 0, ranges = 0;
     for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->records[i].match;

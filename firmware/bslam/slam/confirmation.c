@@ -1,4 +1,5 @@
-// Whether what is seen is a beacon: existence evidence. MATH "Position and appearance".
+// Whether what is seen is a beacon: existence evidence. MATH "Which beacon is it".
+#include "bslam/settings_internal.h"
 #include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
@@ -8,10 +9,14 @@ static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
 // And one without a distance, of a sensor that measures some.
 static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 
+// Where identity is not told, a beacon that was seen for less may be one that was not recognised for a
+// moment.
+enum { LASTING_US = 300000 };
+
 /// Whether a sighting's score counts: where appearance decides, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
-    return slam->settings.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
+    return bslam_weighs_likelihood(&slam->settings) && sighting->score != 0;
 }
 
 /// What a sighting's score says for a beacon. What has no distance, of a sensor that measures some, is of
@@ -54,10 +59,18 @@ static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_r
     }
 }
 
+/// Whether it was seen for long enough to be no mistake.
+static bool lasts(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
+{
+    return !bslam_weighs_likelihood(&slam->settings) || slam->settings.confirm_sightings == 1 ||
+           beacon->last_seen_us - beacon->first_seen_us >= LASTING_US;
+}
+
 static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon)
 {
     const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->settings.existence_sum;
-    if (!beacon->confirmed && is_sure && beacon->views >= slam->settings.confirm_sightings) {
+    if (!beacon->confirmed && is_sure && beacon->views >= slam->settings.confirm_sightings &&
+        lasts(slam, beacon)) {
         beacon->confirmed = true;
         slam->confirmed_now = true;
     }

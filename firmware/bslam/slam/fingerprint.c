@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "bslam/slam/doubt.h"
+
 static const uint64_t FNV_PRIME = 0x100000001b3u;
 
 static uint64_t add_word(uint64_t hash, uint32_t word)
@@ -73,6 +75,10 @@ uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
     hash = add_words(hash, &slam->misfit, sizeof slam->misfit);
     hash = add_words(hash, &slam->bearing_noise, sizeof slam->bearing_noise);
     hash = add_words(hash, &slam->range_noise, sizeof slam->range_noise);
+    for (int k = 0; k < bslam_slam_doubts(slam); k++) {
+        hash = add_state(hash, &slam->doubts->others[k].ekf);
+        hash = add_words(hash, &slam->doubts->others[k].behind, sizeof slam->doubts->others[k].behind);
+    }
     if (bslam_slam_smooths(slam)) {
         hash = add_smoother(hash, slam->smoother);
     }

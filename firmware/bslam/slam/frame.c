@@ -1,55 +1,15 @@
+// A frame as one hypothesis takes it: associated, fused, tidied up.
 #include "base/trig.h"
 #include "bslam/association/duplicates.h"
-#include "bslam/association/missed_beacons.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
+#include "bslam/settings_internal.h"
+#include "bslam/slam/doubt.h"
 #include "bslam/slam/slam_internal.h"
 
-// Six degrees: at the distance of a wall, as much as two beacons are apart.
-static const bslam_real_t DOUBTFUL_HEADING_RAD2 = BSLAM_R(0.01);
-
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
-static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 
 // ---- from where a frame was taken -------------------------------------------------------------------------
-
-/// Of a frame that is older than the filter: the way since is odometry's, and so is its doubt; of speeds that
-/// are states the filter knows more.
-static bslam_pose_t look_back(const bslam_slam_t *slam, int64_t back_us, bslam_vantage_t *vantage)
-{
-    bslam_history_view_t view = {.robot = {0, 0, 0}};
-    const bslam_status_t status = bslam_history_look_back(&slam->history, &slam->settings, back_us, &view);
-    (void)status;  // the frame was checked
-    bslam_real_t forward_var_m2 = view.forward_var_m2, turn_var_rad2 = view.turn_var_rad2;
-    if (slam->settings.velocity_states != 0) {
-        const bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
-        const bslam_real_t back_s = (bslam_real_t)(int32_t)back_us * SECONDS_PER_US, square = back_s * back_s;
-        forward_var_m2 = square * robot.covariance[BSLAM_STATE_FORWARD][BSLAM_STATE_FORWARD];
-        turn_var_rad2 = square * robot.covariance[BSLAM_STATE_TURN][BSLAM_STATE_TURN];
-    }
-    const bslam_real_t way2_m2 = view.robot.x_m * view.robot.x_m + view.robot.y_m * view.robot.y_m;
-    vantage->position_var_m2 = forward_var_m2 + way2_m2 * turn_var_rad2;
-    vantage->heading_var_rad2 = turn_var_rad2;
-    return view.robot;
-}
-
-/// The filter is there, or has passed it. Of a frame that is ahead of odometry: where the robot will be.
-static bslam_vantage_t vantage_of(const bslam_slam_t *slam, int64_t behind_us)
-{
-    const bslam_settings_t *p = &slam->settings;
-    const int64_t back_us = behind_us - slam->history.filter.behind_us;
-    const int64_t moment_us = slam->elapsed_us - behind_us;
-    bslam_vantage_t vantage = {.mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad},
-                               .moment_us = moment_us > slam->moment_us ? moment_us : slam->moment_us,
-                               .is_elsewhere = back_us != 0};
-    if (vantage.is_elsewhere) {
-        const bslam_motion_t last = bslam_history_newest(&slam->history);
-        const bslam_pose_t robot =
-            back_us < 0 ? bslam_history_look_ahead(p, &last, -back_us) : look_back(slam, back_us, &vantage);
-        vantage.mount = bslam_pose_compose(&robot, &vantage.mount);
-    }
-    return vantage;
-}
 
 /// A sighting of a frame that is older than the filter is as doubtful as the way since makes it.
 static void doubt(const bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam_sighting_t *seen)
@@ -86,8 +46,8 @@ static void carry_on(const bslam_slam_t *slam, const bslam_vantage_t *vantage, i
 
 // ---- accounts ---------------------------------------------------------------------------------------------
 
-static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
-                         const bslam_beacon_t *beacon)
+void bslam_slam_fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
+                             const bslam_beacon_t *beacon)
 {
     account->outcome = outcome;
     account->reason = reason;
@@ -105,7 +65,7 @@ static bslam_real_t test_ratio(bslam_real_t gate_d2, bslam_real_t distance2)
 static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon_t *beacon,
                    bslam_account_t *account)
 {
-    fill_account(account, BSLAM_OUTCOME_REJECTED, reason, beacon);
+    bslam_slam_fill_account(account, BSLAM_OUTCOME_REJECTED, reason, beacon);
     slam->counters.gated += reason == BSLAM_REASON_GATE ? 1u : 0u;
     slam->counters.map_full += reason == BSLAM_REASON_MAP_FULL ? 1u : 0u;
     slam->counters.duplicates += reason == BSLAM_REASON_DUPLICATE ? 1u : 0u;
@@ -133,7 +93,7 @@ static void count_tentative(bslam_slam_t *slam, int64_t time_us, const bslam_rec
         record->account->test_ratio = test_ratio(slam->settings.gate_d2, match->distance2);
         return;
     }
-    fill_account(record->account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
+    bslam_slam_fill_account(record->account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
     if (beacon != NULL) {
         note_match(slam, time_us, record->sighting, beacon, match->distance2);
     }
@@ -168,7 +128,7 @@ static void fuse_match(bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam
         account->test_ratio = test_ratio(innovation->gate_d2, fusion.distance2);
         return;
     }
-    fill_account(account, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE, beacon);
+    bslam_slam_fill_account(account, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE, beacon);
     account->test_ratio = test_ratio(innovation->gate_d2, fusion.distance2);
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
@@ -236,39 +196,37 @@ static void add_new(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bs
     if (bslam_slam_smooths(slam)) {
         keep_seen(slam, vantage, sighting, index);
     }
-    fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
+    bslam_slam_fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;
 }
 
-/// The gate of a frame. Where appearance decides, and for a while nothing has been where it should be, it is
-/// the pose that errs: all that association takes for a candidate is used.
+/// The gate of a frame. By likelihood, where for a while nothing has been where it should be, it is the pose
+/// that errs: all that association takes for a candidate is used.
 static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
 {
     const bslam_settings_t *settings = &slam->settings;
-    const bool opens = settings->association == BSLAM_ASSOCIATION_SVM && settings->gate_d2 > 0 &&
+    const bool opens = bslam_weighs_likelihood(settings) && settings->gate_d2 > 0 &&
                        settings->gate_d2 < settings->candidate_d2 &&
-                       !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
+                       !bslam_is_placed(&slam->ekf, BSLAM_VIEW_US, -1, time_us);
     return opens ? settings->candidate_d2 : settings->gate_d2;
-}
-
-/// Whether a match would turn the robot to whatever it is taken for. It has no distance that might contradict
-/// it, and nothing known has been where it should be for a while. The heading is doubtful, or the match
-/// hardly leads.
-static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
-                     const bslam_match_t *match)
-{
-    const bslam_settings_t *settings = &slam->settings;
-    return settings->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance &&
-           !sighting->has_range &&
-           (bslam_ekf_covariance(&slam->ekf, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
-            match->lead < settings->decision_delay_score) &&
-           !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
 }
 
 // ---- the stages, in their order: bslam_slam_close_frame ---------------------------------------------------
 
-static void associate(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sightings,
-                      int count)
+/// What comes into view is looked at anew.
+static void begin_views(bslam_slam_t *slam, int64_t time_us, int count)
+{
+    for (int i = 0; i < count && bslam_slam_learns(slam); i++) {
+        const bslam_match_t *match = &slam->records[i].match;
+        if (match->verdict == BSLAM_VERDICT_MATCH &&
+            time_us - slam->ekf.beacons[match->beacon].last_seen_us > BSLAM_VIEW_US) {
+            slam->appearance->of[match->beacon].view_frames = 0;
+        }
+    }
+}
+
+void bslam_slam_associate(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                          const bslam_sighting_t *sightings, int count, const bslam_bar_t *bar)
 {
     const bslam_sighting_frame_t frame = {.ekf = &slam->ekf,
                                           .settings = &slam->settings,
@@ -276,13 +234,16 @@ static void associate(bslam_slam_t *slam, const bslam_vantage_t *vantage, const 
                                           .mount = &vantage->mount,
                                           .sightings = sightings,
                                           .count = count,
-                                          .time_us = vantage->moment_us};
+                                          .time_us = vantage->moment_us,
+                                          .bar = bar,
+                                          .is_exact = bslam_slam_doubts(slam) > 0 && slam->doubts->is_exact};
     for (int i = 0; i < count; i++) {
         slam->records[i].sighting = &sightings[i];
         slam->records[i].account = &slam->accounts[i];
     }
     const bslam_associate_fn method = bslam_associate_method(&slam->settings);
     method(&frame, slam->records);
+    begin_views(slam, vantage->moment_us, count);
 }
 
 /// What of a match's distance is used, before any innovation is taken.
@@ -319,20 +280,15 @@ static void take_innovation(bslam_slam_t *slam, const bslam_vantage_t *vantage, 
 /// them before the first is fused, so that the order within a frame does not matter.
 static void measure(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
-    const int64_t moment_us = vantage->moment_us;
     choose_distances(slam, &vantage->mount, count);
-    const bslam_real_t gate_d2 = gate_of(slam, moment_us);
+    const bslam_real_t gate_d2 = gate_of(slam, vantage->moment_us);
     for (int i = 0; i < count; i++) {
         bslam_record_t *record = &slam->records[i];
         bslam_match_t *match = &record->match;
-        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, moment_us, record->sighting, match)) {
-            match->verdict = BSLAM_VERDICT_DEFER;
-            match->reason = BSLAM_REASON_AMBIGUOUS;
-        }
         if (match->verdict == BSLAM_VERDICT_REJECT) {
             reject(slam, match->reason, NULL, record->account);
         } else if (match->verdict == BSLAM_VERDICT_DEFER) {
-            fill_account(record->account, BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
+            bslam_slam_fill_account(record->account, BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
             take_innovation(slam, vantage, gate_d2, record);
         }
@@ -388,66 +344,23 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, const bsla
     augment(slam, vantage, count);
 }
 
-// ---- learning ---------------------------------------------------------------------------------------------
+// ---- views ------------------------------------------------------------------------------------------------
 
-static bool was_tentative(const bslam_account_t *account)
+bool bslam_slam_was_tentative(const bslam_account_t *account)
 {
     return account->reason == BSLAM_REASON_TENTATIVE && account->has_beacon;
 }
 
-/// Which matches are delayed, and how well those fit that were made. What has just begun is itself for sure.
-static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
+/// In how many frames of its view a beacon was matched, as far as they count.
+static void count_views(bslam_slam_t *slam, int count)
 {
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count && bslam_slam_learns(slam); i++) {
         const bslam_account_t *account = slam->records[i].account;
-        const bslam_match_t *match = &slam->records[i].match;
-        if (match->delayed_for >= 0) {
-            bslam_appearance_note_delay(slam->appearance, &slam->settings, match->delayed_for, time_us);
-        } else if (account->outcome == BSLAM_OUTCOME_NEW) {
-            slam->appearance->of[bslam_slam_find_beacon(slam, account->beacon_uid)].view_score =
-                slam->settings.again_odds;
-        } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account)) {
-            slam->appearance->of[match->beacon].view_score = match->view_score;
+        if (account->outcome == BSLAM_OUTCOME_MATCHED || bslam_slam_was_tentative(account)) {
+            uint8_t *frames = &slam->appearance->of[slam->records[i].match.beacon].view_frames;
+            *frames = (uint8_t)(*frames + (*frames < BSLAM_VIEW_FRAMES ? 1 : 0));
         }
     }
-}
-
-static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
-{
-    if (!bslam_slam_learns(slam) || slam->settings.association != BSLAM_ASSOCIATION_SVM) {
-        return;
-    }
-    note_matches(slam, time_us, count);
-    if (slam->is_frozen) {
-        return;
-    }
-    bool all_matched = count > 0;
-    for (int i = 0; i < count; i++) {
-        const bslam_account_t *account = slam->records[i].account;
-        const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
-        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account);
-        all_matched = all_matched && is_matched;
-        if (!is_new && !is_matched) {
-            continue;
-        }
-        const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
-        if (is_new || slam->records[i].match.sure) {
-            bslam_appearance_train(slam->appearance, &slam->settings, index, slam->ekf.beacon_count,
-                                   slam->travelled_um, &sightings[i]);
-        } else {
-            slam->appearance->counters.unsure++;
-        }
-    }
-    const int leaves = bslam_duplicates_settle(slam->appearance, &slam->ekf, &slam->settings, time_us);
-    if (leaves != BSLAM_NO_DUPLICATE) {
-        bslam_slam_drop_beacon(slam, leaves);
-    }
-    const int missed = bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->settings, time_us,
-                                                 slam->travelled_um, all_matched);
-    if (missed != BSLAM_NO_MISSED_BEACON) {
-        bslam_slam_drop_beacon(slam, missed);
-    }
-    (void)bslam_learner_work(&slam->appearance->learner, slam->settings.learn_budget);
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------
@@ -487,16 +400,30 @@ static void drop_competitors(bslam_slam_t *slam)
     slam->confirmed_now = false;
 }
 
-/// Rays whose distance is known become points; tentative beacons whose time is up leave.
-static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
+/// Of two beacons in one place one leaves, where identity is not known.
+static void drop_duplicate(bslam_slam_t *slam, int64_t time_us)
 {
+    if (!bslam_weighs_likelihood(&slam->settings) || slam->is_frozen) {
+        return;
+    }
+    const int leaves = bslam_duplicates_settle(&slam->ekf, &slam->settings, time_us);
+    if (leaves != BSLAM_NO_DUPLICATE) {
+        bslam_slam_drop_beacon(slam, leaves);
+        slam->counters.retired++;
+    }
+}
+
+/// Rays whose distance is known become points; tentative beacons whose time is up leave.
+void bslam_slam_tidy_map(bslam_slam_t *slam, const bslam_vantage_t *vantage)
+{
+    drop_duplicate(slam, vantage->moment_us);
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (is_unconfirmed(&slam->settings, beacon, time_us)) {
+        if (is_unconfirmed(&slam->settings, beacon, vantage->moment_us)) {
             bslam_slam_drop_beacon(slam, b);
             slam->counters.removed++;
         } else if (beacon->kind == BSLAM_BEACON_RAY &&
-                   bslam_ekf_settle_ray(&slam->ekf, &slam->settings, mount, b)) {
+                   bslam_ekf_settle_ray(&slam->ekf, &slam->settings, &vantage->mount, b)) {
             slam->counters.settled++;
         }
     }
@@ -505,79 +432,9 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
     }
 }
 
-/// Time passes in a withheld frame, too: it leaves what one without sightings does.
-static void tidy(bslam_slam_t *slam, const bslam_vantage_t *vantage)
+void bslam_slam_use_associated(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
-    if (!slam->is_lost) {
-        tidy_map(slam, vantage->moment_us, &vantage->mount);
-    }
-    if (bslam_slam_smooths(slam)) {
-        bslam_smoother_frame(slam->smoother, &slam->settings, &slam->ekf);
-    }
-}
-
-static void count_accounts(bslam_slam_t *slam, int count)
-{
-    bslam_slam_counters_t *counters = &slam->counters;
-    counters->frames++;
-    counters->sightings += (uint32_t)count;
-    uint32_t *const by_outcome[] = {[BSLAM_OUTCOME_REJECTED] = &counters->rejected,
-                                    [BSLAM_OUTCOME_MATCHED] = &counters->matched,
-                                    [BSLAM_OUTCOME_NEW] = &counters->added,
-                                    [BSLAM_OUTCOME_DEFERRED] = &counters->deferred};
-    for (int i = 0; i < count; i++) {
-        (*by_outcome[slam->accounts[i].outcome])++;
-    }
-    counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
-}
-
-bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                     int count, bslam_vantage_t *vantage)
-{
-    int64_t behind_us;
-    const bslam_status_t status = bslam_slam_check_frame(slam, time_us, sightings, count, &behind_us);
-    if (status != BSLAM_OK) {
-        slam->counters.frames_refused++;
-        return status;
-    }
-    bslam_slam_note_frame(slam, time_us, sightings, count);
-    bslam_slam_predict_until(slam, behind_us > 0 ? behind_us : 0);
-    *vantage = vantage_of(slam, behind_us);
-    slam->moment_us = vantage->moment_us;
-    bslam_odometry_start(&slam->odometry, time_us);
-    return BSLAM_OK;
-}
-
-static void withhold(bslam_slam_t *slam, int count)
-{
-    for (int i = 0; i < count; i++) {
-        fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
-    }
-}
-
-void bslam_slam_close_frame(bslam_slam_t *slam, const bslam_vantage_t *vantage,
-                            const bslam_sighting_t *sightings, int count, bool use)
-{
-    if (use && !slam->is_lost) {
-        associate(slam, vantage, sightings, count);
-        bslam_slam_mark_tentative(slam, count);
-        use_matches(slam, vantage, count);  // measure, fuse, correct, augment
-        learn(slam, vantage->moment_us, sightings, count);
-    } else {
-        withhold(slam, count);
-    }
-    tidy(slam, vantage);
-    slam->account_count = count;
-    count_accounts(slam, count);
-}
-
-bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                    int count)
-{
-    bslam_vantage_t vantage;
-    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &vantage);
-    if (status == BSLAM_OK) {
-        bslam_slam_close_frame(slam, &vantage, sightings, count, true);
-    }
-    return status;
+    bslam_slam_mark_tentative(slam, count);
+    use_matches(slam, vantage, count);  // measure, fuse, correct, augment
+    count_views(slam, count);
 }

@@ -42,10 +42,10 @@ bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beaco
     return slam->misfit > WRONG && is_believed(beacon);
 }
 
-void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion)
+void bslam_slam_doubt_motion(bslam_real_t misfit, bslam_real_t unseen_s, bslam_motion_t *motion)
 {
-    if (slam->misfit > DOUBTFUL && slam->unseen_s < UNSEEN_MAX_S && !slam->is_lost) {
-        const bslam_real_t more = SLIP_VAR_PER_S * (slam->misfit - DOUBTFUL) * motion->dt_s;
+    if (misfit > DOUBTFUL && unseen_s < UNSEEN_MAX_S) {
+        const bslam_real_t more = SLIP_VAR_PER_S * (misfit - DOUBTFUL) * motion->dt_s;
         motion->forward_var_m2 += more;
         motion->turn_var_rad2 += more;
     }

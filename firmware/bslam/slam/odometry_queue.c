@@ -13,13 +13,22 @@ static uint32_t whole_micrometres(bslam_real_t forward_m)
                : (uint32_t)(TRAVEL_MAX_M * MICROMETRES_PER_M);
 }
 
+/// A robot that is lost has no sightings that could fit.
+static void doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion)
+{
+    if (!slam->is_lost) {
+        bslam_slam_doubt_motion(slam->misfit, slam->unseen_s, motion);
+    }
+}
+
 /// The filter goes through one waiting motion, or its part before the moment until_us before the newest end.
 static void predict_step(bslam_slam_t *slam, int64_t until_us)
 {
     bslam_history_place_t place = slam->history.filter;
     bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
-    bslam_slam_doubt_motion(slam, &motion);
+    bslam_slam_predict_others(slam, &motion);
+    doubt_motion(slam, &motion);
     slam->unseen_s += motion.dt_s;
     bslam_ekf_predict(&slam->ekf, &slam->settings, &motion, &moved);
     if (bslam_slam_smooths(slam)) {
@@ -86,7 +95,7 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
     const int64_t until_us = behind_us > 0 ? behind_us : 0;
     while (place.behind_us > until_us) {
         bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
-        bslam_slam_doubt_motion(slam, &motion);
+        doubt_motion(slam, &motion);
         bslam_robot_predict(&robot, &slam->settings, &motion, &moved);
     }
     *pose = bslam_pose_of(robot.mean);

@@ -4,6 +4,7 @@
 
 #include "base/trig.h"
 #include "bslam/model/pose.h"
+#include "bslam/slam/doubt.h"
 #include "bslam/slam/slam_internal.h"
 #include "bslam/settings_internal.h"
 #include "base/scalar.h"
@@ -42,6 +43,7 @@ bool bslam_slam_are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_r
 static void begin_elsewhere(bslam_slam_t *slam)
 {
     slam->misfit = 0;
+    bslam_slam_end_doubt(slam);
     if (bslam_slam_smooths(slam)) {
         bslam_smoother_leave_stand(slam->smoother);
     }
@@ -128,6 +130,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
         }
     }
     int index;
+    bslam_slam_end_doubt(slam);
     const bslam_status_t status =
         bslam_slam_has_uid(slam) ? bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index) : BSLAM_E_MAP_FULL;
     if (status == BSLAM_OK) {
@@ -139,6 +142,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
 
 void bslam_slam_forget_map(bslam_slam_t *slam)
 {
+    bslam_slam_end_doubt(slam);
     if (bslam_slam_learns(slam)) {
         bslam_appearance_clear(slam->appearance);
     }
@@ -153,6 +157,7 @@ bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
     if (index < 0) {
         return BSLAM_E_NO_BEACON;
     }
+    bslam_slam_end_doubt(slam);
     bslam_slam_drop_beacon(slam, index);
     return BSLAM_OK;
 }

@@ -39,6 +39,7 @@ typedef struct bslam_slam {
     bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
     bslam_appearance_t *appearance;      ///< the caller's; NULL: none attached
     bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
+    struct bslam_doubts *doubts;         ///< the caller's; NULL: none attached
     bslam_slam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;
@@ -58,6 +59,11 @@ static inline bool bslam_slam_smooths(const bslam_slam_t *slam)
     return BSLAM_SMOOTHER != 0 && slam->smoother != NULL;
 }
 
+static inline bool bslam_slam_can_doubt(const bslam_slam_t *slam)
+{
+    return BSLAM_HYPOTHESES_MAX > 1 && slam->doubts != NULL;
+}
+
 /// Settings may stand in *slam: starting over. No appearance and no smoother is attached.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *settings,
                                                 int *bad_id);
@@ -67,6 +73,10 @@ void bslam_slam_attach_appearance(bslam_slam_t *slam, bslam_appearance_t *appear
 
 /// From now on the smoother leads the filter, if the setting `filter` says so. NULL: no more.
 void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother);
+
+/// From now on doubts about which beacon is seen may be followed, where the settings say so and no smoother
+/// leads the filter. NULL: no more.
+void bslam_slam_attach_doubts(bslam_slam_t *slam, struct bslam_doubts *doubts);
 
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
                                                     const bslam_odometry_reading_t *reading);

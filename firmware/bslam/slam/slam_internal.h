@@ -54,14 +54,18 @@ void bslam_slam_note_misfit(bslam_slam_t *slam, int count);
 /// Whether a beacon's sightings are used beyond their gate: of late so much was beyond it that the pose errs.
 bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beacon);
 
-/// Raises the noise of a motion while sightings do not fit: wheels that slip say nothing of it.
-void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion);
+/// Raises the noise of a motion while sightings do not fit, as a misfit says: wheels that slip say nothing of
+/// it.
+void bslam_slam_doubt_motion(bslam_real_t misfit, bslam_real_t unseen_s, bslam_motion_t *motion);
 
 // ---- coloured_noise.c -------------------------------------------------------------------------------------
 
-/// Raises the noise of a frame's matches by how much errors of late were those of the sightings before,
-/// if `correlation_m` asks for it. Once a frame, behind their innovations.
+/// Notes how much errors of late were those of the sightings before, and raises the noise of a frame's
+/// matches by that, if `correlation_m` asks for it. Once a frame, behind their innovations.
 void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count);
+
+/// What part of its evidence a sighting brings, since errors hang together. 1: all.
+bslam_real_t bslam_slam_evidence_share(const bslam_slam_t *slam);
 
 // ---- beacon_scale.c ---------------------------------------------------------------------------------------
 
@@ -79,7 +83,7 @@ bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int
 /// What a fused sighting says for the beacon's class. With another class goes another scale. O(n²).
 void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting);
 
-// ---- frame.c: the two halves of bslam_slam_sightings, for who judges a frame first ----------------------
+// ---- frame.c: a frame as one hypothesis takes it ----------------------------------------------------------
 
 /// From where a frame was taken, as the filter has it that uses the frame.
 typedef struct bslam_vantage {
@@ -88,6 +92,40 @@ typedef struct bslam_vantage {
     bool is_elsewhere;   ///< the frame is older than the filter, or newer than odometry
     bslam_real_t position_var_m2, heading_var_rad2;  ///< of the way since, where the frame is older
 } bslam_vantage_t;
+
+/// A beacon that was not seen for so long comes into view anew.
+#define BSLAM_VIEW_US 1000000
+/// So many frames of a view tell what a beacon looks like.
+#define BSLAM_VIEW_FRAMES 5
+
+/// Decides which beacons a frame's sightings show, but for what is barred; NULL: nothing is.
+void bslam_slam_associate(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                          const bslam_sighting_t *sightings, int count, const bslam_bar_t *bar);
+
+/// Fuses what was associated and adds beacons: all of a frame but learning and tidying.
+void bslam_slam_use_associated(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count);
+
+/// Fills in what became of a sighting that is not fused, yet; beacon NULL: none.
+void bslam_slam_fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
+                             const bslam_beacon_t *beacon);
+
+/// Whether a sighting counted for a tentative beacon, and for no more.
+bool bslam_slam_was_tentative(const bslam_account_t *account);
+
+/// Of two beacons in one place one leaves. Rays whose distance is known become points; tentative beacons
+/// whose time is up leave.
+void bslam_slam_tidy_map(bslam_slam_t *slam, const bslam_vantage_t *vantage);
+
+// ---- doubt.c ----------------------------------------------------------------------------------------------
+
+/// Before a frame: the hypothesis that explains most is in force from now on, and what is too far behind or
+/// old is forgotten.
+void bslam_slam_settle_doubts(bslam_slam_t *slam, int64_t time_us);
+
+/// The others go through a motion that the one in force went through.
+void bslam_slam_predict_others(bslam_slam_t *slam, const bslam_motion_t *motion);
+
+// ---- step.c: the two halves of bslam_slam_sightings, for who judges a frame first ------------------------
 
 /// Checks a frame and takes the filter to its moment, if it is not there yet. After BSLAM_OK
 /// bslam_slam_close_frame must follow with the same frame.

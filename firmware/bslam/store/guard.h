@@ -12,8 +12,8 @@
 
 #include "bslam/slam/slam.h"
 
-/// What is watched beside the pipeline: recovery, appearance, smoother.
-#define BSLAM_GUARD_MEMBERS 3
+/// What is watched beside the pipeline: recovery, appearance, smoother, doubts.
+#define BSLAM_GUARD_MEMBERS 4
 
 typedef struct bslam_guard {
     bslam_guard_counters_t counters;

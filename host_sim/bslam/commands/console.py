@@ -139,7 +139,7 @@ def _watch(arguments: argparse.Namespace) -> int:
         if arguments.record is None:
             _follow(slam, screen, None, arguments)
         else:
-            learns = slam.params["association"] == BY_APPEARANCE
+            learns = slam.params["association"] in BY_APPEARANCE
             seeds = rendered_seeds() if learns else None  # what a robot with cameras starts from
             start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max, seeds)
             start.about.update(slam.target_description())

@@ -62,6 +62,7 @@ def macros_of(real: str, beacons_max: int) -> Macros:
         ("BSLAM_HISTORY_MAX", "128"),
         ("BSLAM_APPEARANCE", "1"),
         ("BSLAM_SMOOTHER", "1"),
+        ("BSLAM_HYPOTHESES_MAX", "8"),
         ("BSLAM_GUARD", "2"),
     ]
 

@@ -12,8 +12,8 @@ from bslam.core.inputs import INT32, checked_rows, frame_rows, number, whole
 from bslam.core.raw import Flash, library
 from bslam.errors import BslamError
 
-BY_APPEARANCE = 3
-"""The setting `association` by which classifiers learn (BSLAM_ASSOCIATION_SVM)."""
+BY_APPEARANCE = (3, 6, 7, 8)
+"""Values of the setting `association` by which classifiers learn."""
 _TICKS = (0, 2**32 - 1)
 _NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE
 _BESIDE_SPEEDS = "contradicts velocity_states = 1: allowed beside it is"

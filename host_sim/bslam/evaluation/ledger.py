@@ -94,7 +94,8 @@ class Ledger:
         self._counts["sightings"] += 1
         is_beacon = identity != CLUTTER
         if account.result == "matched":
-            self._counts["wrong"] += not is_beacon or self.identity(account.beacon_uid) != identity
+            shown = self.identity(account.beacon_uid) if account.beacon_uid in self._shown else identity
+            self._counts["wrong"] += not is_beacon or shown != identity  # begun while in doubt: unheard of
             self._shown[account.beacon_uid][identity] += 1
         elif account.result == "new":
             self._counts["false_new"] += is_beacon and identity in mapped

@@ -51,7 +51,7 @@ def start_of(log: Log, params: Mapping[str, int | float], beacons_max: int, real
         name=log.name,
         params=dict(params),
         beacons_max=beacons_max,
-        seeds=log.seeds if params["association"] == BY_APPEARANCE else None,
+        seeds=log.seeds if params["association"] in BY_APPEARANCE else None,
         robot=robot_text(log.robot),
         true_beacons=known,
         words=log.words,

@@ -23,7 +23,7 @@ from bslam.evaluation.ledger import Ledger, corrupt_identities
 from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
-from bslam.options import Number, RunOptions, core_params, odometry_lead_us
+from bslam.options import BY_APPEARANCE, Number, RunOptions, core_params, odometry_lead_us
 from bslam.recording import Recorder, RecordingWriter
 from bslam.recording.aslog import start_of, true_poses
 from bslam.runs.kept import read_blob
@@ -135,7 +135,7 @@ def _kept_text(options: RunOptions) -> str | None:
 
 
 def uses_appearance(options: RunOptions) -> bool:
-    return options.association == "svm"
+    return options.association in BY_APPEARANCE
 
 
 def beacons_to_hold(log: Log, options: RunOptions) -> int:

@@ -73,7 +73,7 @@ class RemoteSlam:
         self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
         self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
         self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
-        if not as_it_is and seeds is not None and self._values["association"] == BY_APPEARANCE:
+        if not as_it_is and seeds is not None and self._values["association"] in BY_APPEARANCE:
             self._send_signatures(Message.SEEDS, seeds)
         if as_it_is:
             self._values = {name: self._param(number) for number, name in enumerate(self._values)}

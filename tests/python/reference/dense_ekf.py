@@ -35,6 +35,7 @@ Pose = Sequence[float]
 
 X, Y, THETA, FORWARD, TURN = range(5)
 STEP = 1e-30
+BENT_HEADING_VAR_RAD2 = 0.0027
 """Of the complex derivative: its square vanishes beside 1, so that the result is exact to rounding."""
 
 NO_NOISE: Matrix = np.zeros((0, 0))
@@ -358,6 +359,8 @@ class DenseEkf:
         if sighting.range_m is not None:
             common = 0.0 if self.beacons[index].kind == "sized" else p["range_scale_sd"] * range_m
             variances = [bearing_var, self._range_variance(range_m) + common**2]
+            bent = self._bent(varied, range_row, bearing_row, range_m)
+            variances = [own + more for own, more in zip(variances, bent, strict=True)]
             return [bearing_row, range_row], [bearing, sighting.range_m - range_m], variances
         # The bend of the model, to second order: half the trace of (Hessian P)² of a complex logarithm.
         joint = np.array([length_row, bearing_row])
@@ -365,6 +368,20 @@ class DenseEkf:
         bend = length_var * direction_var + cross**2
         variance = bearing_var * p["bearing_only_variance_factor"] + p["bearing_only_curvature_factor"] * bend
         return [bearing_row], [bearing], [variance]
+
+    def _bent(self, varied, range_row: Vector, bearing_row: Vector, range_m: float) -> list[float]:  # type: ignore[no-untyped-def]
+        """What a heading in doubt adds to the variances of direction and distance, MATH (46)."""
+        heading_row = np.imag(varied[THETA]) / STEP
+        with_heading = self.own_covariance @ heading_row
+        variance = float(heading_row @ with_heading)
+        if not self.invariant or variance < BENT_HEADING_VAR_RAD2:
+            return [0.0, 0.0]
+        along_m, turn_rad2 = float(range_row @ with_heading), float(bearing_row @ with_heading)
+        turn = turn_rad2 / variance
+        return [
+            0.75 * (along_m / range_m * (1 + 2 * turn)) ** 2,
+            0.75 * (range_m * turn_rad2 * (1 + turn)) ** 2,
+        ]
 
     def _range_variance(self, range_m: float) -> float:
         p = self.params

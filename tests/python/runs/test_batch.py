@@ -165,8 +165,8 @@ def test_names_tell_runs_apart_by_what_differs():
     ]
     wrong = replace(plain, wrong_identity_rate=0.05)
     assert run_names([room] * 2, [plain, wrong]) == ["room_seed0_known", "room_seed0_known0.05"]
-    changed = replace(plain, recovery="carried", parameters=(("decision_delay_us", 0),))
-    names = ["room_seed0_recoverycarried_decision_delay_us0", "room_seed0"]
+    changed = replace(plain, recovery="carried", parameters=(("doubt_us", 0),))
+    names = ["room_seed0_recoverycarried_doubt_us0", "room_seed0"]
     assert run_names([room] * 2, [changed, plain]) == names
     assert run_names([room] * 2, [plain, changed]) == names[::-1]
 

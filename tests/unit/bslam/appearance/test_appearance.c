@@ -2,22 +2,19 @@
 
 #include <math.h>
 
+#include "bslam/appearance/calibration.h"
 #include "bslam/association/viewpoint.h"
+#include "known_map.h"
 #include "plain_settings.h"
 
 static bslam_appearance_t appearance;
-static bslam_settings_t settings;
 static uint32_t travelled_um;
 
-enum { SHARE = 3 };
+/// So often a beacon resembles another one before it shares that one's classifier.
+enum { SHARE = 12 };
 
 static int setup(void **state)
 {
-    settings = unit_settings();
-    settings.appearance_samples = 3;
-    settings.learn_travel_m = BSLAM_R(0.1);
-    settings.share_value = BSLAM_R(0.3);
-    settings.share_sightings = SHARE;
     travelled_um = 0;
     return bslam_appearance_init(&appearance, NULL, 0) == BSLAM_OK ? 0 : -1;
 }
@@ -43,7 +40,7 @@ static void show(int index, int count, const float *signature)
 {
     bslam_sighting_t sighting = unit_polar(0, 4, -1);
     sighting.signature = signature;
-    bslam_appearance_train(&appearance, &settings, index, count, travelled_um, &sighting);
+    bslam_appearance_train(&appearance, index, count, travelled_um, &sighting);
 }
 
 /// A sure sighting of beacon `index` of `count`, which looks like an object, a good way after the last.
@@ -62,7 +59,7 @@ static double value_of(int index, int object, int view)
     bslam_sample_t sample;
     view_of(object, view, signature);
     assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
-    return (double)bslam_appearance_ask(&appearance, &settings, index, &sample).value;
+    return (double)bslam_appearance_ask(&appearance, index, &sample).value;
 }
 
 static void test_each_beacon_learns_its_own_look(void **state)
@@ -84,7 +81,7 @@ static void test_each_beacon_learns_its_own_look(void **state)
 static void test_nothing_is_known_of_a_beacon_without_a_classifier(void **state)
 {
     bslam_sample_t sample = {{0}};
-    const bslam_opinion_t opinion = bslam_appearance_ask(&appearance, &settings, 0, &sample);
+    const bslam_opinion_t opinion = bslam_appearance_ask(&appearance, 0, &sample);
     assert_true(opinion.weight == 0.0f && opinion.value == 0.0f);
 }
 
@@ -95,7 +92,7 @@ static void test_weight_grows_with_the_samples(void **state)
         teach(1, 2, 1, view);
     }
     bslam_sample_t sample = {{0}};
-    assert_near(bslam_appearance_ask(&appearance, &settings, 0, &sample).weight, 0.5, 1e-6);
+    assert_near(bslam_appearance_ask(&appearance, 0, &sample).weight, 0.5, 1e-6);
 }
 
 static void test_a_robot_that_stands_still_teaches_once(void **state)
@@ -182,7 +179,11 @@ static void test_a_shared_classifier_that_refuses_a_beacon_is_left(void **state)
     learn_two(8);
     appearance.of[2].classifier = appearance.of[0].classifier;  // shared by mistake: beacon 2 looks otherwise
     for (int view = 0; view < SHARE; view++) {
-        teach(2, 3, 1, 30 + view);
+        assert_int_equal(appearance.counters.parted, 0);
+        float signature[BSLAM_SAMPLE_FEATURES];
+        view_of(1, 30 + view, signature);
+        travelled_um += 150000;
+        show(2, 3, signature);  // sooner than it could be trained to take that, too
     }
     assert_int_equal(appearance.counters.parted, 1);
     assert_int_not_equal(appearance.of[2].classifier, appearance.of[0].classifier);
@@ -227,32 +228,31 @@ static void see_class(uint8_t beacon_class, int times)
     sighting.beacon_class = beacon_class;
     for (int i = 0; i < times; i++) {
         travelled_um += 150000;
-        bslam_appearance_train(&appearance, &settings, 0, 1, travelled_um, &sighting);
+        bslam_appearance_train(&appearance, 0, 1, travelled_um, &sighting);
     }
 }
 
 static void test_class_odds_are_of_counts_with_a_little_doubt(void **state)
 {
-    settings.class_doubt = BSLAM_R(0.5);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), 0, 1e-6);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, 3), 0, 1e-6);
     see_class(3, 6);
     see_class(7, 2);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), log(8 * 6.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 7), log(8 * 2.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 1), log(8 * 0.5 / 12), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, 3), log(8 * 6.1 / 8.8), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, 7), log(8 * 2.1 / 8.8), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, 1), log(8 * 0.1 / 8.8), 1e-5);
     see_class(BSLAM_CLASS_NONE, 3);
     see_class(BSLAM_APPEARANCE_CLASSES + 1, 3);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), log(8 * 6.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, BSLAM_CLASS_NONE), 0, 0);
-    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, BSLAM_APPEARANCE_CLASSES + 1), 0, 0);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, 3), log(8 * 6.1 / 8.8), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, BSLAM_CLASS_NONE), 0, 0);
+    assert_near(bslam_appearance_class_odds(&appearance, 0, BSLAM_APPEARANCE_CLASSES + 1), 0, 0);
 }
 
 static void test_a_class_seen_for_long_is_unlearned_again(void **state)
 {
     see_class(3, 300);
-    assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) < -2);
+    assert_true(bslam_appearance_class_odds(&appearance, 0, 5) < -2);
     see_class(5, 40);
-    assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) > 1);
+    assert_true(bslam_appearance_class_odds(&appearance, 0, 5) > 1);
 }
 
 /// As a map may have it that another build wrote.
@@ -262,12 +262,116 @@ static void test_a_class_count_beyond_the_limit_comes_down_and_never_wraps(void 
         appearance.of[0].seen_as[2] = (uint8_t)count;
         for (int view = 0; view < 20; view++) {
             see_class(3, 1);
-            assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 3) > 0);
+            assert_true(bslam_appearance_class_odds(&appearance, 0, 3) > 0);
             assert_int_equal(bslam_appearance_class(&appearance, 0), 3);
         }
         assert_true(appearance.of[0].seen_as[2] <= 33);
     }
 }
+
+// ---- log odds ---------------------------------------------------------------------------------------------
+
+static const int32_t METHODS[] = {BSLAM_ASSOCIATION_SVM, BSLAM_ASSOCIATION_NEAREST_SAMPLE,
+                                  BSLAM_ASSOCIATION_CENTROID, BSLAM_ASSOCIATION_BOTH};
+
+/// What a method says of a sample whose first feature is this, the others 0.
+static double odds_by(int32_t association, double weight, double first)
+{
+    bslam_settings_t settings = unit_settings();
+    settings.association = association;
+    settings.appearance_weight = real(weight);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {(float)first};
+    bslam_sample_t sample;
+    assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
+    return (double)bslam_appearance_odds(&appearance, &settings, 0, &sample);
+}
+
+/// Beacon 0 has a classifier whose value is so many times the first feature, and that keeps two samples: 0.4
+/// and 0.8 in the first feature.
+static void know_two_samples(double value)
+{
+    unit_give_machine(&appearance, 0, value, 2);
+    const float kept[] = {0.4f, 0.8f};
+    for (int i = 0; i < 2; i++) {
+        const float signature[BSLAM_SAMPLE_FEATURES] = {kept[i]};
+        assert_int_equal(bslam_sample_encode(signature, &appearance.learner.samples[i]), BSLAM_OK);
+    }
+}
+
+static void test_odds_are_by_the_methods_coefficients(void **state)
+{
+    know_two_samples(0.5);
+    for (int k = 0; k < COUNT_OF(METHODS); k++) {
+        const bslam_calibration_t *by = bslam_calibration_of(METHODS[k]);
+        const double distance = by->to_middle ? 0.3 : 0.1, value = 0.45, more = log(2);
+        const double expected =
+            (double)by->offset + (double)by->distance * distance + (double)by->value * value +
+            more * ((double)by->more + (double)by->more_distance * distance + (double)by->more_value * value);
+        assert_true(fabs(expected) < 8);
+        assert_near(odds_by(METHODS[k], 1, 0.9), expected, 0.1);  // features are stored in eight bits
+        assert_near(odds_by(METHODS[k], 0.5, 0.9), 0.5 * odds_by(METHODS[k], 1, 0.9), 1e-6);
+        assert_near(odds_by(METHODS[k], 0, 0.9), 0, 0);
+    }
+}
+
+static void test_odds_are_for_what_looks_alike_and_against_what_does_not(void **state)
+{
+    know_two_samples(2);
+    for (int k = 0; k < COUNT_OF(METHODS); k++) {
+        assert_true(odds_by(METHODS[k], 1, 0.6) > 0);
+        assert_true(odds_by(METHODS[k], 1, -0.6) < 0);
+    }
+}
+
+static void test_odds_are_clipped_before_they_are_weighted(void **state)
+{
+    unit_give_machine(&appearance, 0, 10, 3);
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, 1), 8, 1e-6);
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, -1), -8, 1e-6);
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 2, -1), -16, 1e-6);
+}
+
+static void test_a_classifier_that_knows_nothing_says_nothing(void **state)
+{
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, 1), 0, 0);  // it has none
+    unit_give_machine(&appearance, 0, 10, 3);
+    appearance.learner.classifiers[0].negatives = 0;  // nothing to tell the beacon from
+    for (int k = 0; k < COUNT_OF(METHODS); k++) {
+        assert_near(odds_by(METHODS[k], 1, 1), 0, 0);
+    }
+}
+
+// ---- hypotheses -------------------------------------------------------------------------------------------
+
+static void test_while_hypotheses_share_the_classifiers_none_leaves(void **state)
+{
+    learn_two(4);
+    const int16_t first = appearance.of[0].classifier, second = appearance.of[1].classifier;
+    bslam_appearance_share(&appearance, true);
+    bslam_appearance_forget(&appearance, 0, 2);
+    assert_true(bslam_learner_samples(&appearance.learner, first) > 0);
+    bslam_appearance_share(&appearance, false);
+    assert_int_equal(bslam_learner_samples(&appearance.learner, first), 0);
+    assert_true(bslam_learner_samples(&appearance.learner, second) > 0);
+    assert_int_equal(appearance.of[0].classifier, second);
+}
+
+/// It is nobody's twin any more, so that no beacon comes to share what is not there.
+static void test_a_classifier_that_leaves_late_is_no_twin_either(void **state)
+{
+    learn_two(8);
+    const int16_t first = appearance.of[0].classifier;
+    teach(2, 3, 0, 20);
+    assert_int_equal(appearance.of[2].twin, first);
+    bslam_appearance_share(&appearance, true);
+    bslam_appearance_forget(&appearance, 0, 3);
+    assert_int_equal(appearance.of[1].twin, first);
+    bslam_appearance_share(&appearance, false);
+    assert_int_equal(appearance.of[1].twin, BSLAM_NO_CLASSIFIER);
+    assert_int_equal(appearance.of[1].twin_count, 0);
+}
+
+// ---- viewpoints -------------------------------------------------------------------------------------------
 
 static const double TURN_RAD = 6.283185307179586;
 
@@ -287,39 +391,6 @@ static void test_sectors_are_equal_parts_of_a_turn(void **state)
     }
     assert_in_range(sector_at(0.5), 0, BSLAM_APPEARANCE_SECTORS - 1);
     assert_in_range(sector_at(-0.5), 0, BSLAM_APPEARANCE_SECTORS - 1);
-}
-
-static double viewpoint_odds(int sectors_on)
-{
-    return (double)bslam_appearance_viewpoint_odds(&appearance, &settings, 0,
-                                                   sector_at((7.5 + sectors_on) / BSLAM_APPEARANCE_SECTORS));
-}
-
-/// A wall's beacon has a back; one that stands free is seen from all sides in time.
-static void test_side_odds_fall_with_the_angle_to_where_it_was_seen_from(void **state)
-{
-    settings.viewpoint_low = 3;
-    settings.viewpoint_high = 1;
-    for (int k = -8; k <= 8; k++) {
-        assert_near(viewpoint_odds(k), 0, 0);  // from nowhere yet
-    }
-    const int here = sector_at(7.5 / BSLAM_APPEARANCE_SECTORS);  // the last, beside the first
-    appearance.of[0].seen_from[here] = 40;
-    const double passing[] = {0, 0, -1, -2, -3, -3, -3, -3, -3};
-    for (int k = -8; k <= 8; k++) {
-        assert_near(viewpoint_odds(k), passing[abs(k)], 1e-6);
-    }
-    appearance.of[0].seen_from[(here + 1) % BSLAM_APPEARANCE_SECTORS] = 1;
-    const double two_sides[] = {-3, -3, -2, -1, 0, 1, 1, 0, -1, -2, -3};
-    for (int k = -5; k <= 5; k++) {
-        assert_near(viewpoint_odds(k), two_sides[k + 5], 1e-6);
-    }
-    memset(appearance.of[0].seen_from, 1, sizeof appearance.of[0].seen_from);
-    for (int k = -8; k <= 8; k++) {
-        assert_near(viewpoint_odds(k), 1, 0);
-    }
-    assert_near(bslam_appearance_viewpoint_odds(&appearance, &settings, 1, 0), 0,
-                0);  // each beacon has its own
 }
 
 static void test_all_beacons_alike_end_with_one_classifier(void **state)
@@ -366,28 +437,6 @@ static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)
     assert_memory_equal(&appearance, &before, sizeof appearance);
 }
 
-static void test_a_wait_lasts_from_its_first_moment_unless_it_paused_too_long(void **state)
-{
-    settings.decision_delay_us = 1000000;
-    const int64_t start_us = ((int64_t)1 << 32) - 500000;  // the clock of the wait turns over within it
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, 0));
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us));
-    for (int64_t ago_us = 0; ago_us < 900000; ago_us += 300000) {
-        bslam_appearance_note_delay(&appearance, &settings, 2, start_us + ago_us);
-        assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + ago_us));
-    }
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 999998));
-    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1000000));
-    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1600000));
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 1, start_us + 1000000));
-    bslam_appearance_note_delay(&appearance, &settings, 2,
-                                start_us + 1600001);  // the last was over a second before
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1600001));
-    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 2600001));
-    bslam_appearance_forget(&appearance, 2, 3);
-    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 2600001));
-}
-
 static void test_clear_forgets_all(void **state)
 {
     learn_two(4);
@@ -406,8 +455,13 @@ int main(void)
         cmocka_unit_test_setup(test_class_odds_are_of_counts_with_a_little_doubt, setup),
         cmocka_unit_test_setup(test_a_class_seen_for_long_is_unlearned_again, setup),
         cmocka_unit_test_setup(test_a_class_count_beyond_the_limit_comes_down_and_never_wraps, setup),
+        cmocka_unit_test_setup(test_odds_are_by_the_methods_coefficients, setup),
+        cmocka_unit_test_setup(test_odds_are_for_what_looks_alike_and_against_what_does_not, setup),
+        cmocka_unit_test_setup(test_odds_are_clipped_before_they_are_weighted, setup),
+        cmocka_unit_test_setup(test_a_classifier_that_knows_nothing_says_nothing, setup),
+        cmocka_unit_test_setup(test_while_hypotheses_share_the_classifiers_none_leaves, setup),
+        cmocka_unit_test_setup(test_a_classifier_that_leaves_late_is_no_twin_either, setup),
         cmocka_unit_test_setup(test_sectors_are_equal_parts_of_a_turn, setup),
-        cmocka_unit_test_setup(test_side_odds_fall_with_the_angle_to_where_it_was_seen_from, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
         cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_classifier, setup),
         cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),
@@ -424,7 +478,6 @@ int main(void)
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_teaches_nothing, setup),
         cmocka_unit_test_setup(test_without_a_free_slot_a_beacon_goes_without, setup),
         cmocka_unit_test_setup(test_init_refuses_too_many_seeds_and_changes_nothing, setup),
-        cmocka_unit_test_setup(test_a_wait_lasts_from_its_first_moment_unless_it_paused_too_long, setup),
         cmocka_unit_test_setup(test_clear_forgets_all, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,7 +13,7 @@ enum {
     // A training looks at every block once or twice, makes each row once, and then solves.
     BLOCKS = BSLAM_LEARNER_SLOTS +
              (BSLAM_SEEDS_MAX + BSLAM_SAMPLES_PER_CLASSIFIER - 1) / BSLAM_SAMPLES_PER_CLASSIFIER,
-    PIECES_MAX = 2 * BLOCKS + BSLAM_SOLVER_ROWS_MAX + BSLAM_LEARNER_STEPS_MAX + 4,
+    PIECES_MAX = 2 * BLOCKS + BSLAM_SOLVER_ROWS_MAX + 220 + 4,
 };
 
 static bslam_learner_t learner;

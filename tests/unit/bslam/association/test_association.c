@@ -17,7 +17,8 @@ typedef struct decision {
 static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                          const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, settings, NULL, mount, sightings, count, 0};
+    const bslam_sighting_frame_t frame = {
+        .ekf = ekf, .settings = settings, .mount = mount, .sightings = sightings, .count = count};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     method(&frame, decision.records);

@@ -29,6 +29,13 @@ static bslam_ekf_t map_of(const bslam_settings_t *settings, const double (*place
     return ekf;
 }
 
+static bslam_sighting_frame_t frame_of(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                       const bslam_sighting_t *seen, int count)
+{
+    return (bslam_sighting_frame_t){
+        .ekf = ekf, .settings = settings, .mount = &on_axle, .sightings = seen, .count = count};
+}
+
 typedef struct pairing {
     int beacon[SIGHTINGS];
     int pairs;
@@ -125,7 +132,7 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
             continue;
         }
         bslam_record_t records[SIGHTINGS];
-        const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, SIGHTINGS, 0};
+        const bslam_sighting_frame_t frame = frame_of(&ekf, &settings, seen, SIGHTINGS);
         bslam_associate_joint(&frame, records);
         for (int i = 0; i < SIGHTINGS; i++) {
             assert_int_equal(records[i].match.beacon, expected.beacon[i]);
@@ -148,7 +155,7 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
         seen[i] = unit_polar(atan2(places[i][1], places[i][0]) + 0.15, hypot(places[i][0], places[i][1]), -1);
     }
     bslam_record_t records[3];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 3, 0};
+    const bslam_sighting_frame_t frame = frame_of(&ekf, &settings, seen, 3);
     bslam_associate_mahalanobis(&frame, records);
     assert_int_not_equal(records[0].match.beacon, 0);
     bslam_associate_joint(&frame, records);
@@ -167,7 +174,7 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
     bslam_ekf_t ekf = map_of(&settings, places, 2);
     covariance_break(&ekf, ekf.beacons[0].at, 2);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = frame_of(&ekf, &settings, seen, 2);
     bslam_record_t records[2];
     bslam_associate_joint(&frame, records);
     unit_assert_decided(&records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -182,7 +189,7 @@ static void test_joint_out_of_nodes_still_decides_all(void **state)
     const bslam_ekf_t ekf = map_of(&settings, places, 1);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(2, 4, -1)};
     bslam_record_t records[2];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = frame_of(&ekf, &settings, seen, 2);
     bslam_associate_joint(&frame, records);
     assert_int_equal(records[0].match.verdict, BSLAM_VERDICT_REJECT);
     assert_int_equal(records[0].match.reason, BSLAM_REASON_AMBIGUOUS);
@@ -202,7 +209,7 @@ static void test_joint_more_sightings_than_are_paired_together(void **state)
     seen[6] = seen[2];  // the same beacon again, in the second group
     const bslam_ekf_t ekf = map_of(&settings, places, 8);
     bslam_record_t records[8];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 8, 0};
+    const bslam_sighting_frame_t frame = frame_of(&ekf, &settings, seen, 8);
     bslam_associate_joint(&frame, records);
     for (int i = 0; i < 8; i++) {
         assert_int_equal(records[i].match.beacon, i == 6 ? -1 : i);

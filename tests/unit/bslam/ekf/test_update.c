@@ -61,6 +61,24 @@ static void append(measurement_t *m, const dense_t *rows, int row, double y, dou
     m->r.at[at][at] = variance;
 }
 
+/// What a heading in doubt adds to the noise of a sighting with a distance: of that, and of the direction.
+typedef struct bent {
+    double range_var_m2, bearing_var_rad2;
+} bent_t;
+
+static bent_t bent_by_heading(const bslam_ekf_t *ekf, const dense_t *rows, double range_m)
+{
+    const dense_t covariance = twin_of(ekf).covariance, with = dense_product(rows, &covariance);
+    const double variance = covariance.at[BSLAM_STATE_THETA][BSLAM_STATE_THETA];
+    if (variance < 0.0027) {
+        return (bent_t){0, 0};
+    }
+    const double turn = with.at[1][BSLAM_STATE_THETA] / variance;
+    const double along_m = range_m * with.at[1][BSLAM_STATE_THETA] * (1 + turn);
+    const double across_rad = with.at[0][BSLAM_STATE_THETA] / range_m * (1 + 2 * turn);
+    return (bent_t){0.75 * along_m * along_m, 0.75 * across_rad * across_rad};
+}
+
 /// Adds a sighting's rows. `weight` divides its noise.
 static void measure(const bslam_ekf_t *ekf, const bslam_settings_t *settings, const plan_t *plan,
                     const bslam_sighting_t *sighting, double weight, measurement_t *m)
@@ -73,18 +91,21 @@ static void measure(const bslam_ekf_t *ekf, const bslam_settings_t *settings, co
     twin_observe(ekf, &mount, plan->beacon, state, &range_m, &bearing_rad);
     const double bearing_sd = (double)settings->bearing_sd_rad;
     const double factor = plan->has_range ? 1 : (double)settings->bearing_only_variance_factor;
+    double sensor[3], scale;
+    twin_sensor(ekf, &mount, state, sensor, &scale);
+    const bool bends = plan->has_range && settings->filter != BSLAM_FILTER_STANDARD;
+    const bent_t bent = bends ? bent_by_heading(ekf, &rows, range_m / scale) : (bent_t){0, 0};
     append(m, &rows, 1, unit_angle_between((double)sighting->bearing_rad, bearing_rad),
-           bearing_sd * bearing_sd * factor / weight);
+           (bearing_sd * bearing_sd * factor + bent.bearing_var_rad2) / weight);
     if (plan->has_range) {
         const double floor_m = (double)settings->range_sd_floor_m;
         const double fraction_m = (double)settings->range_sd_fraction * range_m;
         const double quadratic_m = (double)settings->range_sd_per_m * range_m * range_m;
         const bool is_sized = ekf->beacons[plan->beacon].kind == BSLAM_BEACON_SIZED;
         const double common_m = is_sized ? 0 : (double)settings->range_scale_sd * range_m;
-        append(
-            m, &rows, 0, (double)sighting->range_m - range_m,
-            (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m + common_m * common_m) /
-                weight);
+        const double white_m2 = floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m;
+        append(m, &rows, 0, (double)sighting->range_m - range_m,
+               (white_m2 + common_m * common_m + bent.range_var_m2) / weight);
     }
 }
 
@@ -103,21 +124,23 @@ static bslam_status_t fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings, i
     return bslam_ekf_fuse(ekf, settings, &innovation, fusion);
 }
 
-/// Fuses all plans in one frame, in C and as one batch of the textbook, and compares.
+/// Fuses all plans in one frame, in C and as one batch of the textbook, and compares. The innovations are
+/// taken before the first is fused.
 static void assert_frame_is_the_textbooks(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                           const plan_t *plans, int count)
 {
     measurement_t m = {0};
-    bslam_sighting_t sightings[SIGHTINGS_MAX];
+    bslam_innovation_t innovations[SIGHTINGS_MAX];
     for (int i = 0; i < count; i++) {
-        sightings[i] = sighting_of(ekf, &plans[i]);
-        measure(ekf, settings, &plans[i], &sightings[i], 1, &m);
+        const bslam_sighting_t sighting = sighting_of(ekf, &plans[i]);
+        measure(ekf, settings, &plans[i], &sighting, 1, &m);
+        innovations[i] = innovation_of(ekf, settings, plans[i].beacon, &sighting);
     }
     twin_t expected = twin_of(ekf);
     twin_update(ekf, settings->filter, &m.h, &m.y, &m.r, &expected);
     for (int i = 0; i < count; i++) {
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(ekf, settings, plans[i].beacon, &sightings[i], &fusion), BSLAM_OK);
+        assert_int_equal(bslam_ekf_fuse(ekf, settings, &innovations[i], &fusion), BSLAM_OK);
         assert_true(fusion.weight == 1);
     }
     bslam_ekf_correct(ekf, settings);
@@ -246,15 +269,16 @@ static void test_fuse_order_within_a_frame_does_not_matter(void **state)
     unit_random_t random = {4};
     bslam_ekf_t forwards = random_filter(&settings, &random);
     bslam_ekf_t backwards = forwards;
-    bslam_sighting_t sightings[5];
+    bslam_innovation_t innovations[5];
     for (int i = 0; i < 5; i++) {
         const plan_t plan = random_plan(&random, i, i < 3);
-        sightings[i] = sighting_of(&forwards, &plan);
+        const bslam_sighting_t sighting = sighting_of(&forwards, &plan);
+        innovations[i] = innovation_of(&forwards, &settings, i, &sighting);
     }
     for (int i = 0; i < 5; i++) {
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(&forwards, &settings, i, &sightings[i], &fusion), BSLAM_OK);
-        assert_int_equal(fuse(&backwards, &settings, 4 - i, &sightings[4 - i], &fusion), BSLAM_OK);
+        assert_int_equal(bslam_ekf_fuse(&forwards, &settings, &innovations[i], &fusion), BSLAM_OK);
+        assert_int_equal(bslam_ekf_fuse(&backwards, &settings, &innovations[4 - i], &fusion), BSLAM_OK);
     }
     bslam_ekf_correct(&forwards, &settings);
     bslam_ekf_correct(&backwards, &settings);
@@ -387,11 +411,12 @@ static void test_fuse_distance2_is_conditional_on_what_was_fused_before(void **s
     measure(&ekf, &settings, &plans[0], &sightings[0], 1, &both);
     measure(&ekf, &settings, &plans[1], &sightings[1], 1, &both);
     const twin_t twin = twin_of(&ekf);
+    const bslam_innovation_t second = innovation_of(&ekf, &settings, 1, &sightings[1]);
     bslam_fusion_t fusion;
     assert_int_equal(fuse(&ekf, &settings, 0, &sightings[0], &fusion), BSLAM_OK);
     const double first_d2 = distance2_of(&first, &twin.covariance);
     assert_near(fusion.distance2, first_d2, TOLERANCE * (1 + first_d2));
-    assert_int_equal(fuse(&ekf, &settings, 1, &sightings[1], &fusion), BSLAM_OK);
+    assert_int_equal(bslam_ekf_fuse(&ekf, &settings, &second, &fusion), BSLAM_OK);
     // The chain rule: d2 of both = d2 of the first + d2 of the second given the first.
     const double both_d2 = distance2_of(&both, &twin.covariance);
     assert_near(fusion.distance2, both_d2 - first_d2, TOLERANCE * (1 + both_d2));
@@ -594,16 +619,55 @@ static void test_innovation_bearing_only_grows_with_doubt_of_length_and_directio
     }
 }
 
-static void test_innovation_with_a_distance_has_no_bend(void **state)
+static void test_innovation_with_a_distance_has_no_bend_of_directions(void **state)
 {
     bslam_settings_t settings = params_of(0, false);
     settings.bearing_only_curvature_factor = 3;
     unit_random_t random = {18};
-    const bslam_ekf_t ekf = random_filter(&settings, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
+    forget_heading(&ekf);
     const plan_t plan = random_plan(&random, 0, true);
     const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
     const bslam_innovation_t innovation = innovation_of(&ekf, &settings, 0, &sighting);
     assert_near(innovation.bearing_var_rad2, 0.02 * 0.02, UNIT_ROUNDING * 1e-3);
+}
+
+/// What a heading of this variance adds, to a robot that has gone 2 m since and looks at a beacon 4 m ahead,
+/// or 4 m to its left.
+static bent_t bent_at(double heading_var_rad2, bool is_ahead)
+{
+    const bslam_settings_t settings = params_of(BSLAM_FILTER_INVARIANT, false);
+    const bslam_pose_t origin = {0, 0, 0};
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &settings);
+    int index;
+    assert_int_equal(bslam_ekf_add_known(&ekf, is_ahead ? 4 : 0, is_ahead ? 0 : 4, &index), BSLAM_OK);
+    dense_t p = dense_zero(3, 3);
+    p.at[BSLAM_STATE_THETA][BSLAM_STATE_THETA] = heading_var_rad2;
+    p.at[BSLAM_STATE_Y][BSLAM_STATE_THETA] = p.at[BSLAM_STATE_THETA][BSLAM_STATE_Y] = 2 * heading_var_rad2;
+    p.at[BSLAM_STATE_Y][BSLAM_STATE_Y] = 4 * heading_var_rad2 + 0.01;
+    covariance_set(&ekf, &p);
+    const bslam_sighting_t sighting = unit_polar(is_ahead ? 0 : 1.570796, 4, 0);
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &origin, &sighting, index, &innovation), BSLAM_OK);
+    const double floor_m = 0.01, fraction_m = 0.08, quadratic_m = 0.16;
+    const double white_m2 = floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m;
+    return (bent_t){(double)innovation.range_var_m2 - white_m2,
+                    (double)innovation.bearing_var_rad2 - 0.02 * 0.02};
+}
+
+/// On the arc on which it may stand the robot is farther from what is ahead than on the tangent, by 3/2 of
+/// the squared error of its heading; and to a side of what is aside, by a quarter of it.
+static void test_innovation_with_a_distance_grows_by_the_bend_of_a_heading_in_doubt(void **state)
+{
+    const double tolerance = UNIT_ROUNDING;
+    const bent_t ahead = bent_at(0.04, true), aside = bent_at(0.04, false), little = bent_at(0.0026, true);
+    assert_near(ahead.range_var_m2, 0.75 * 0.12 * 0.12, tolerance);
+    assert_near(ahead.bearing_var_rad2, 0, tolerance);
+    assert_near(aside.range_var_m2, 0, tolerance);
+    assert_near(aside.bearing_var_rad2, 0.75 * 0.02 * 0.02, tolerance);
+    assert_near(little.range_var_m2, 0, tolerance);
+    assert_near(bent_at(0.0028, true).range_var_m2, 0.75 * 0.0084 * 0.0084, tolerance);
 }
 
 // ---- refusals ---------------------------------------------------------------------------------------------
@@ -833,7 +897,8 @@ int main(void)
 
         cmocka_unit_test(test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model),
         cmocka_unit_test(test_innovation_bearing_only_grows_with_doubt_of_length_and_direction),
-        cmocka_unit_test(test_innovation_with_a_distance_has_no_bend),
+        cmocka_unit_test(test_innovation_with_a_distance_has_no_bend_of_directions),
+        cmocka_unit_test(test_innovation_with_a_distance_grows_by_the_bend_of_a_heading_in_doubt),
 
         cmocka_unit_test(test_innovation_of_a_beacon_at_the_sensor_is_singular),
         cmocka_unit_test(test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular),

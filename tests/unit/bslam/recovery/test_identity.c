@@ -18,7 +18,6 @@ static bslam_appearance_t appearance;
 static int setup(void **state)
 {
     bslam_settings_t settings = unit_settings();
-    settings.appearance_samples = 3;
     int bad_id;
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);

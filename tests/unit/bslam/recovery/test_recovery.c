@@ -322,7 +322,6 @@ static void go_by_looks(void)
     look_on(50, 0, 0, 0, BEACONS);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
     slam.settings.association = BSLAM_ASSOCIATION_SVM;
-    slam.settings.appearance_samples = 3;
     bslam_slam_attach_appearance(&slam, &appearance);
     unit_give_machine(&appearance, 0, 1, 16);
     unit_give_machine(&appearance, 1, -1, 16);
@@ -377,7 +376,6 @@ static void go_by_own_looks(void)
     look_on(50, 0, 0, 0, BEACONS);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
     slam.settings.association = BSLAM_ASSOCIATION_SVM;
-    slam.settings.appearance_samples = 3;
     slam.settings.learn_budget = 0;
     bslam_slam_attach_appearance(&slam, &appearance);
     for (int b = 0; b < BEACONS; b++) {

@@ -107,7 +107,8 @@ static void test_order_within_a_frame_does_not_matter(void **state)
     }
 }
 
-static void test_correlation_that_is_told_is_not_looked_for(void **state)
+/// It is noted all the same: hypotheses are compared by what it leaves of a sighting's evidence.
+static void test_correlation_that_is_told_widens_nothing(void **state)
 {
     const double off[BEACONS] = {1, -1, 0.5};
     slam.settings.correlation_m = BSLAM_R(0.5);
@@ -115,7 +116,18 @@ static void test_correlation_that_is_told_is_not_looked_for(void **state)
         frame_of(off, off, 0);
     }
     assert_near((double)slam.records[0].innovation.bearing_var_rad2 / (SD_RAD * SD_RAD), 1, 1e-6);
-    assert_near(slam.bearing_noise.square, 0, 0);
+    assert_near(bslam_slam_evidence_share(&slam), 1 / 99.0, 1e-5);
+}
+
+static void test_what_a_sighting_tells_is_what_the_worse_of_its_noises_leaves(void **state)
+{
+    double by_bearing, by_range;
+    assert_near(bslam_slam_evidence_share(&slam), 1, 0);
+    factors_after(0.9, 0.5, &by_bearing, &by_range);
+    assert_near(bslam_slam_evidence_share(&slam) * by_bearing, 1, 0.01);
+    setup(NULL);
+    factors_after(0, 0.8, &by_bearing, &by_range);
+    assert_near(bslam_slam_evidence_share(&slam) * by_range, 1, 0.01);
 }
 
 int main(void)
@@ -126,7 +138,8 @@ int main(void)
         cmocka_unit_test_setup(test_noise_that_alternates_is_trusted_no_more_than_it_is_told, setup),
         cmocka_unit_test_setup(test_what_never_changes_tells_a_hundredth, setup),
         cmocka_unit_test_setup(test_order_within_a_frame_does_not_matter, setup),
-        cmocka_unit_test_setup(test_correlation_that_is_told_is_not_looked_for, setup),
+        cmocka_unit_test_setup(test_correlation_that_is_told_widens_nothing, setup),
+        cmocka_unit_test_setup(test_what_a_sighting_tells_is_what_the_worse_of_its_noises_leaves, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

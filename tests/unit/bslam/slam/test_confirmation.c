@@ -6,7 +6,7 @@
 #include "bslam/slam/slam.h"
 #include "plain_settings.h"
 
-enum { STEP_US = 40000 };
+enum { STEP_US = 300000 };  // a beacon is confirmed no sooner
 
 static bslam_slam_t slam;
 static int64_t now_us;
@@ -185,7 +185,7 @@ static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
 {
     slam.settings.gate_d2 = BSLAM_R(0.5);
     (void)see(1.5);
-    const bslam_account_t account = see_at(0.27, 1.5);
+    const bslam_account_t account = see_at(0.4, 1.5);
     assert_int_equal(account.outcome, BSLAM_OUTCOME_REJECTED);
     assert_int_equal(account.reason, BSLAM_REASON_GATE);
     assert_true(account.test_ratio > 1);

@@ -105,15 +105,22 @@ static void test_gate_opens_for_half_of_what_is_seen_and_closes_again(void **sta
 
 static void test_motion_is_doubted_as_much_as_sightings_do_not_fit(void **state)
 {
-    bslam_slam_t *slam = &bslam_instance(&robot)->slam;
     static const double misfits[] = {0.2, 0.35, 0.45, 0.8}, more[] = {0, 0, 0.008, 0.036};
     for (int i = 0; i < COUNT_OF(misfits); i++) {
         bslam_motion_t motion = {.dt_s = BSLAM_R(0.04), .forward_var_m2 = 1, .turn_var_rad2 = 2};
-        slam->misfit = real(misfits[i]);
-        bslam_slam_doubt_motion(slam, &motion);
+        bslam_slam_doubt_motion(real(misfits[i]), BSLAM_R(1.9), &motion);
         assert_near(motion.forward_var_m2, 1 + more[i], 1e-5);
         assert_near(motion.turn_var_rad2, 2 + more[i], 1e-5);
     }
+}
+
+/// Where nothing is seen for long, what did not fit then says nothing of the wheels now.
+static void test_motion_that_nobody_has_watched_for_long_is_not_doubted(void **state)
+{
+    bslam_motion_t motion = {.dt_s = BSLAM_R(0.04), .forward_var_m2 = 1, .turn_var_rad2 = 2};
+    bslam_slam_doubt_motion(BSLAM_R(0.8), BSLAM_R(2.0), &motion);
+    assert_near(motion.forward_var_m2, 1, 0);
+    assert_near(motion.turn_var_rad2, 2, 0);
 }
 
 int main(void)
@@ -124,6 +131,7 @@ int main(void)
         cmocka_unit_test_setup(test_beacon_that_was_moved_does_not_move_the_robot, setup),
         cmocka_unit_test_setup(test_gate_opens_for_half_of_what_is_seen_and_closes_again, setup),
         cmocka_unit_test_setup(test_motion_is_doubted_as_much_as_sightings_do_not_fit, setup),
+        cmocka_unit_test_setup(test_motion_that_nobody_has_watched_for_long_is_not_doubted, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

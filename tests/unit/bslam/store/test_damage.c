@@ -69,7 +69,6 @@ static void begin(int32_t association, int32_t filter)
     settings.filter = filter;
     settings.guard = 1;
     settings.recovery = 1;
-    settings.learn_travel_m = 0;
     settings.learn_budget = 40;
     settings.seeds = seeds;
     settings.seed_count = (int32_t)(sizeof seeds / sizeof seeds[0]);
@@ -165,6 +164,14 @@ static void test_a_flipped_bit_in_the_smoother_is_no_index(void **state)
     flip_in(smoother, sizeof *smoother, 9, 12);
 }
 
+static void test_a_flipped_bit_in_the_doubts_is_no_index(void **state)
+{
+    begin(BSLAM_ASSOCIATION_SVM, BSLAM_FILTER_INVARIANT);
+    drive(30);
+    bslam_doubts_t *doubts = &inside()->doubts;
+    flip_in(&doubts->count, sizeof doubts->count, 3, 13);
+}
+
 static void test_a_flag_of_the_guard_that_flips_does_not_switch_it_off(void **state)
 {
     int bad;
@@ -198,6 +205,7 @@ int main(void)
         cmocka_unit_test(test_a_flipped_bit_in_the_smoother_is_no_index),
         cmocka_unit_test(test_a_flag_of_the_guard_that_flips_does_not_switch_it_off),
         cmocka_unit_test(test_no_damaged_map_is_saved),
+        cmocka_unit_test(test_a_flipped_bit_in_the_doubts_is_no_index),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -175,8 +175,8 @@ static void test_map_load_living_gives_beacons_covariance_and_looks_back(void **
         bslam_sample_t sample;
         assert_int_equal(bslam_sample_encode(kept_signature(object, 50, signature), &sample), BSLAM_OK);
         for (int b = 0; b < 4; b++) {
-            const bslam_opinion_t was = bslam_appearance_ask(&appearance, &slam.settings, b, &sample);
-            const bslam_opinion_t is = bslam_appearance_ask(&other_appearance, &other.settings, b, &sample);
+            const bslam_opinion_t was = bslam_appearance_ask(&appearance, b, &sample);
+            const bslam_opinion_t is = bslam_appearance_ask(&other_appearance, b, &sample);
             assert_near(is.value, was.value, BSLAM_SAMPLE_FLOAT ? 0.02 : 0);
             assert_near(is.weight, was.weight, 0);
         }

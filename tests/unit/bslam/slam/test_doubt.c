@@ -1,0 +1,296 @@
+// It is in doubt which of two beacons is seen: what comes next says who was right.
+#include <math.h>
+
+#include "known_map.h"
+#include "plain_settings.h"
+#include "support.h"
+
+#include "bslam/slam/doubt.h"
+#include "bslam/slam/fingerprint.h"
+#include "bslam/slam/slam_internal.h"
+
+enum { STEP_US = 40000 };
+
+/// Two beacons, 4 m ahead; a heading that is off by as much makes one the other.
+static const double LEFT_RAD = 0.1, RIGHT_RAD = -0.1, RANGE_M = 4.02, DOUBTFUL_RAD = 0.02;
+/// The heading if it is the left one that is seen at DOUBTFUL_RAD, or the right one.
+static const double IF_LEFT_RAD = 0.08, IF_RIGHT_RAD = -0.12;
+
+static bslam_slam_t slam;
+static bslam_doubts_t doubts;
+static bslam_appearance_t appearance;
+static int64_t now_us;
+static bslam_real_t step_m;
+
+static void start(int32_t association, int32_t hypotheses)
+{
+    bslam_settings_t settings = unit_settings();
+    int bad_id;
+    settings.association = association;
+    settings.hypotheses = hypotheses;
+    settings.doubt_us = 5000000;
+    settings.doubt_nats = 6;
+    settings.candidate_d2 = 30;
+    settings.new_per_m2 = BSLAM_R(0.005);
+    settings.left_speed_sd_mps = settings.right_speed_sd_mps = BSLAM_R(1e-3);
+    memset(&doubts, 0x55, sizeof doubts);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
+    bslam_slam_attach_doubts(&slam, &doubts);
+    now_us = 0;
+    step_m = 0;
+}
+
+static int setup(void **state)
+{
+    start(BSLAM_ASSOCIATION_POSITION, 2);
+    return 0;
+}
+
+/// Frames of a robot that goes step_m in each, and what it sees.
+static void see(int frames, const double *bearings_rad, int count)
+{
+    bslam_sighting_t seen[4];
+    for (int i = 0; i < count; i++) {
+        seen[i] = unit_polar(bearings_rad[i], RANGE_M, -1);
+    }
+    for (int k = 0; k < frames; k++) {
+        now_us += STEP_US;
+        const bslam_odometry_reading_t reading = {
+            .source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us, .left_m = step_m, .right_m = step_m};
+        assert_int_equal(bslam_slam_odometry(&slam, &reading), BSLAM_OK);
+        assert_int_equal(bslam_slam_sightings(&slam, now_us, seen, count), BSLAM_OK);
+    }
+}
+
+/// Both, as they are seen if this is the heading.
+static void see_both_from(double heading_rad, int frames)
+{
+    const double both[] = {LEFT_RAD - heading_rad, RIGHT_RAD - heading_rad};
+    see(frames, both, 2);
+}
+
+/// Somebody has turned the robot a little.
+static void doubt_heading(void)
+{
+    const bslam_pose_t origin = {0, 0, 0};
+    assert_int_equal(bslam_slam_set_pose(&slam, &origin, BSLAM_R(0.01), BSLAM_R(0.15)), BSLAM_OK);
+}
+
+/// Both beacons are known and out of view.
+static void know_two(void)
+{
+    see_both_from(0, 10);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+    see(30, NULL, 0);
+    doubt_heading();
+}
+
+/// What is seen then may be either, and is the left one rather than the right one.
+static int setup_doubt(void **state)
+{
+    setup(state);
+    know_two();
+    see(1, &DOUBTFUL_RAD, 1);
+    assert_int_equal(bslam_slam_doubts(&slam), 1);
+    return 0;
+}
+
+static double heading_of(const bslam_ekf_t *ekf)
+{
+    return (double)bslam_ekf_pose(ekf).theta_rad;
+}
+
+static void test_doubts_are_of_likelihood_without_a_smoother(void **state)
+{
+    static bslam_smoother_t smoother;
+    for (int32_t association = 0; association <= BSLAM_ASSOCIATION_BOTH; association++) {
+        const bool is_likely =
+            association == BSLAM_ASSOCIATION_SVM || association >= BSLAM_ASSOCIATION_POSITION;
+        start(association, 2);
+        assert_true(slam.doubts == (is_likely ? &doubts : NULL));
+        bslam_slam_attach_doubts(&slam, NULL);
+        assert_null(slam.doubts);
+        start(association, 1);
+        assert_null(slam.doubts);
+        assert_int_equal(bslam_slam_doubts(&slam), 0);
+        assert_near(bslam_slam_lead(&slam), 0, 0);
+    }
+    setup(NULL);
+    slam.settings.filter = BSLAM_FILTER_SMOOTHER;
+    bslam_slam_attach_smoother(&slam, &smoother);
+    bslam_slam_attach_doubts(&slam, &doubts);
+    assert_null(slam.doubts);
+}
+
+/// Fingerprints of frames in which things come into view, perhaps after one of which it is in doubt.
+static uint64_t run(int32_t hypotheses, bool is_attached, bool is_doubtful)
+{
+    const double four[] = {LEFT_RAD, RIGHT_RAD, 1.5, -1.5};
+    uint64_t chain = BSLAM_FINGERPRINT_START;
+    start(BSLAM_ASSOCIATION_POSITION, hypotheses);
+    bslam_slam_attach_doubts(&slam, is_attached ? &doubts : NULL);
+    if (is_doubtful) {
+        know_two();
+        see(1, &DOUBTFUL_RAD, 1);
+    }
+    for (int k = 0; k < 60; k++) {
+        see(1, four, k < 20 ? 2 : k < 50 ? 0 : 4);
+        chain = bslam_slam_fingerprint(&slam, chain);
+    }
+    return chain;
+}
+
+static void test_one_hypothesis_and_nothing_in_doubt_are_as_without(void **state)
+{
+    const uint64_t with = run(2, true, false);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+    assert_true(with == run(1, true, false));
+    assert_true(with == run(2, false, false));
+    assert_true(run(1, true, true) == run(2, false, true));
+}
+
+static void test_a_doubtful_sighting_begins_another_hypothesis(void **state)
+{
+    assert_near(heading_of(&slam.ekf), IF_LEFT_RAD, 0.01);
+    assert_near(heading_of(&doubts.others[0].ekf), IF_RIGHT_RAD, 0.01);
+    assert_near(bslam_slam_lead(&slam), 0, 2);
+    assert_true(doubts.others[0].behind > 0);
+    assert_int_equal(slam.counters.matched, 8 * 2 + 2 + 1);  // the other one's turn does not count
+}
+
+static void test_what_is_clear_or_was_just_in_view_begins_none(void **state)
+{
+    know_two();
+    slam.settings.doubt_nats = BSLAM_R(0.01);
+    see(1, &DOUBTFUL_RAD, 1);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+    slam.settings.doubt_nats = 6;
+    doubt_heading();
+    see(1, &DOUBTFUL_RAD, 1);
+    assert_true(slam.records[0].match.lead < 6);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+}
+
+static void test_all_hypotheses_go_through_a_motion(void **state)
+{
+    step_m = BSLAM_R(0.05);
+    see(10, NULL, 0);
+    const bslam_pose_t left = bslam_ekf_pose(&slam.ekf), right = bslam_ekf_pose(&doubts.others[0].ekf);
+    assert_near(left.y_m, 0.5 * sin(IF_LEFT_RAD), 0.01);
+    assert_near(right.y_m, 0.5 * sin(IF_RIGHT_RAD), 0.01);
+}
+
+static void test_a_hypothesis_that_explains_much_less_is_forgotten(void **state)
+{
+    see_both_from(IF_LEFT_RAD, 20);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+    assert_near(heading_of(&slam.ekf), IF_LEFT_RAD, 0.01);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+}
+
+/// Before the next frame; the map is the other one's, too, in which what was seen last is nothing new.
+static void test_a_hypothesis_that_explains_more_is_put_in_force(void **state)
+{
+    see_both_from(IF_RIGHT_RAD, 1);
+    assert_near(heading_of(&slam.ekf), IF_LEFT_RAD, 0.02);
+    assert_int_equal(slam.ekf.beacon_count, 3);
+    const uint32_t mistaken = slam.ekf.beacons[2].uid;
+    assert_true(bslam_slam_lead(&slam) < -2);
+    see(1, NULL, 0);
+    assert_near(heading_of(&slam.ekf), IF_RIGHT_RAD, 0.01);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+    see(1, (const double[]){1.5}, 1);
+    assert_true(slam.ekf.beacons[2].uid > mistaken);  // which is given once, whoever gives it
+    see_both_from(IF_RIGHT_RAD, 20);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+    assert_near(heading_of(&slam.ekf), IF_RIGHT_RAD, 0.01);
+    assert_int_equal(slam.ekf.beacon_count, 3);
+}
+
+/// Where nothing tells the two apart it is decided by what little does.
+static void test_a_doubt_that_lasts_is_decided(void **state)
+{
+    for (int is_behind = 0; is_behind < 2; is_behind++) {
+        setup_doubt(NULL);
+        see(slam.settings.doubt_us / STEP_US, &DOUBTFUL_RAD, 1);
+        assert_int_equal(bslam_slam_doubts(&slam), 1);
+        doubts.others[0].behind = is_behind != 0 ? BSLAM_R(0.5) : BSLAM_R(-0.5);
+        see(1, &DOUBTFUL_RAD, 1);
+        assert_int_equal(bslam_slam_doubts(&slam), 0);
+        assert_near(heading_of(&slam.ekf), is_behind != 0 ? IF_LEFT_RAD : IF_RIGHT_RAD, 0.01);
+    }
+}
+
+static void assert_ended_by(bslam_status_t status)
+{
+    assert_int_equal(status, BSLAM_OK);
+    assert_int_equal(bslam_slam_doubts(&slam), 0);
+    setup_doubt(NULL);
+}
+
+static void test_what_changes_pose_or_map_ends_the_doubt(void **state)
+{
+    const bslam_pose_t pose = {1, 1, 1}, nowhere = {real(NAN), 0, 0};
+    assert_ended_by(bslam_slam_set_pose(&slam, &pose, 0, 0));
+    assert_ended_by((bslam_slam_lose_pose(&slam), BSLAM_OK));
+    assert_ended_by((bslam_slam_forget_map(&slam), BSLAM_OK));
+    assert_ended_by(bslam_slam_remove_beacon(&slam, slam.ekf.beacons[0].uid));
+    assert_ended_by(bslam_slam_add_known_beacon(&slam, 5, 1, 1));
+    // What is refused changes nothing.
+    assert_int_equal(bslam_slam_set_pose(&slam, &nowhere, 0, 0), BSLAM_E_NOT_FINITE);
+    assert_int_equal(bslam_slam_remove_beacon(&slam, 77), BSLAM_E_NO_BEACON);
+    assert_int_equal(bslam_slam_add_known_beacon(&slam, -1, 1, 1), BSLAM_E_RANGE);
+    assert_int_equal(bslam_slam_doubts(&slam), 1);
+}
+
+/// Whoever is right, the robot may have been carried meanwhile.
+static void test_a_gap_of_odometry_is_one_for_all_hypotheses(void **state)
+{
+    assert_int_equal(bslam_slam_resume_odometry(&slam, BSLAM_R(0.5), BSLAM_R(0.3)), BSLAM_OK);
+    assert_true(bslam_slam_doubts(&slam) == 0 ||
+                bslam_ekf_covariance(&doubts.others[0].ekf, BSLAM_STATE_THETA, BSLAM_STATE_THETA) > 0.08);
+}
+
+static void start_looking(void)
+{
+    start(BSLAM_ASSOCIATION_SVM, 2);
+    assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
+    bslam_slam_attach_appearance(&slam, &appearance);
+    know_two();
+    unit_give_machine(&appearance, 0, 1, 3);
+    unit_give_machine(&appearance, 1, 1, 3);
+    see(1, &DOUBTFUL_RAD, 1);
+    assert_int_equal(bslam_slam_doubts(&slam), 1);
+}
+
+/// What beacons look like is each hypothesis' own, and goes with it.
+static void test_looks_go_with_the_hypothesis_that_is_put_in_force(void **state)
+{
+    start_looking();
+    doubts.others[0].of[1].classifier = BSLAM_NO_CLASSIFIER;
+    doubts.others[0].behind = -3;
+    see(1, NULL, 0);
+    assert_int_equal(appearance.of[1].classifier, BSLAM_NO_CLASSIFIER);
+    assert_int_equal(doubts.others[0].of[1].classifier, 1);
+    assert_true(appearance.learner.classifiers[1].used);
+    bslam_slam_end_doubt(&slam);
+    assert_false(appearance.learner.classifiers[1].used);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_doubts_are_of_likelihood_without_a_smoother, setup),
+        cmocka_unit_test_setup(test_one_hypothesis_and_nothing_in_doubt_are_as_without, setup),
+        cmocka_unit_test_setup(test_a_doubtful_sighting_begins_another_hypothesis, setup_doubt),
+        cmocka_unit_test_setup(test_what_is_clear_or_was_just_in_view_begins_none, setup),
+        cmocka_unit_test_setup(test_all_hypotheses_go_through_a_motion, setup_doubt),
+        cmocka_unit_test_setup(test_a_hypothesis_that_explains_much_less_is_forgotten, setup_doubt),
+        cmocka_unit_test_setup(test_a_hypothesis_that_explains_more_is_put_in_force, setup_doubt),
+        cmocka_unit_test_setup(test_a_doubt_that_lasts_is_decided, setup_doubt),
+        cmocka_unit_test_setup(test_what_changes_pose_or_map_ends_the_doubt, setup_doubt),
+        cmocka_unit_test_setup(test_a_gap_of_odometry_is_one_for_all_hypotheses, setup_doubt),
+        cmocka_unit_test_setup(test_looks_go_with_the_hypothesis_that_is_put_in_force, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
