@@ -10,6 +10,7 @@
 #include "base/trig.h"
 #include "bslam/recovery/recovery.h"
 #include "base/scalar.h"
+#include "bslam/slam/doubt.h"
 
 enum { BEACONS = 5, FRAMES_MAX = 48, STEP_US = 40000 };
 
@@ -21,6 +22,7 @@ typedef struct robot {
     bslam_appearance_t appearance;
     bslam_smoother_t smoother;
     bslam_recovery_t recovery;
+    bslam_doubts_t doubts;
 } robot_t;
 
 /// Where the robot is, and how it sees.
@@ -208,13 +210,13 @@ static void prepare(robot_t *start, world_t *world, unsigned how)
         bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
         settings.association = (how & 1u) != 0 ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_KNOWN;
         settings.filter = (how & 4u) != 0 ? BSLAM_FILTER_SMOOTHER : BSLAM_FILTER_INVARIANT;
-        settings.learn_travel_m = 0;
         settings.learn_budget = 50;
         settings.confirm_travel_m = 0;
         fuzz_require(bslam_slam_init(&robot.slam, &settings, &bad_id) == BSLAM_OK);
         fuzz_require(bslam_appearance_init(&robot.appearance, NULL, 0) == BSLAM_OK);
         bslam_slam_attach_appearance(&robot.slam, (how & 1u) != 0 ? &robot.appearance : NULL);
         bslam_slam_attach_smoother(&robot.slam, (how & 4u) != 0 ? &robot.smoother : NULL);
+        bslam_slam_attach_doubts(&robot.slam, &robot.doubts);
         robot.recovery = (bslam_recovery_t){0};
         *world = (world_t){.stretch = 1, .has_range = (how & 2u) == 0, .by_looks = (how & 1u) != 0};
         for (int k = 0; k < 12; k++) {

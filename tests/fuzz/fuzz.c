@@ -163,7 +163,6 @@ void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
     int bad_id;
     bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.association = BSLAM_ASSOCIATION_SVM;
-    settings.learn_travel_m = 0;
     settings.left_speed_sd_mps = BSLAM_R(1e-3);
     settings.right_speed_sd_mps = BSLAM_R(1e-3);
     fuzz_require(bslam_slam_init(slam, &settings, &bad_id) == BSLAM_OK);
@@ -172,14 +171,18 @@ void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
         bslam_slam_attach_appearance(slam, appearance);
     }
     for (int view = 1; view <= 8; view++) {
-        const int64_t now_us = view * INT64_C(40000);
-        const bslam_odometry_reading_t reading = {
-            .time_us = now_us, .left_m = BSLAM_R(1e-4), .right_m = BSLAM_R(1e-4)};
+        // To and fro, so far that each view is learned, and for so long that beacons are confirmed.
+        const int64_t now_us = view * INT64_C(50000);
+        const bslam_real_t way_m = view % 2 == 0 ? BSLAM_R(-0.11) : BSLAM_R(0.11);
+        const bslam_real_t at_m = view % 2 == 0 ? 0 : BSLAM_R(0.11);
+        const bslam_odometry_reading_t reading = {.time_us = now_us, .left_m = way_m, .right_m = way_m};
         float signatures[2][BSLAM_SAMPLE_FEATURES] = {{0}};
         bslam_sighting_t seen[3] = {
-            {.bearing_rad = BSLAM_R(-1.0), .range_m = 2, .has_range = true, .label = -1},
-            {.bearing_rad = BSLAM_R(0.5), .range_m = 3, .has_range = true, .label = -1},
+            {.bearing_rad = bslam_atan2(-2, 1 - at_m), .has_range = true, .label = -1},
+            {.bearing_rad = bslam_atan2(1, 3 - at_m), .has_range = true, .label = -1},
             {.bearing_rad = BSLAM_R(2.5), .label = -1}};
+        seen[0].range_m = bslam_sqrt((1 - at_m) * (1 - at_m) + 4);
+        seen[1].range_m = bslam_sqrt((3 - at_m) * (3 - at_m) + 1);
         for (int i = 0; i < 2; i++) {
             signatures[i][9 * i] = 0.7f;
             signatures[i][9 * i + view % 3 + 1] = 0.4f;

@@ -72,7 +72,7 @@ static void go_on(bslam_slam_t *slam)
 {
     const bslam_pose_t origin = {0, 0, 0};
     const bslam_odometry_reading_t reading = {
-        .time_us = 360000, .left_m = BSLAM_R(0.02), .right_m = BSLAM_R(0.03)};
+        .time_us = 450000, .left_m = BSLAM_R(0.02), .right_m = BSLAM_R(0.03)};
     const bslam_sighting_t seen[2] = {
         {.bearing_rad = BSLAM_R(0.3), .range_m = 2, .has_range = true, .label = 1},
         {.bearing_rad = BSLAM_R(-0.9), .label = -1}};
