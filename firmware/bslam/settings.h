@@ -63,8 +63,8 @@ extern "C" {
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     REAL(gate_d2, 13.8, 0.0, 1e6, "squared Mahalanobis distance of the gate (13.8: one in 1000; 0: none)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \
-    INTEGER(association, 0, 0, 8, "0 known, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint, " \
-                                  "5 position, 6 nearest sample, 7 centroid, 8 both of 3 and 6") \
+    INTEGER(association, 0, 0, 8, \
+            "0 known, 1 nearest, 2 Mahalanobis, 3 svm, 4 joint, 5 position, 6 sample, 7 centroid, 8 both") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
     REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, bearing-only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \
