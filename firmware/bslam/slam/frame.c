@@ -376,8 +376,10 @@ static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_
     if (beacon->views == 0 || beacon->score_sum < 0) {
         return true;
     }
-    // Of a detector with scores it is these that speak against it.
-    if (window_us == 0 || beacon->has_scores || time_us - beacon->first_seen_us <= window_us) {
+    // Of a detector with scores it is these that speak against it; what only was not seen for long enough may
+    // be seen again.
+    if (window_us == 0 || beacon->has_scores || beacon->views >= settings->confirm_sightings ||
+        time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
     return settings->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;

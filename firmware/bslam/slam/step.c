@@ -186,8 +186,7 @@ static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *s
     (void)bslam_learner_work(&slam->appearance->learner, slam->settings.learn_budget);
 }
 
-// ---- the two halves
-// -----------------------------------------------------------------------------------------
+// ---- the two halves ---------------------------------------------------------------------------------------
 
 /// Time passes in a withheld frame, too: it leaves what one without sightings does.
 static void tidy(bslam_slam_t *slam, const bslam_vantage_t *vantage)

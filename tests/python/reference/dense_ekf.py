@@ -34,8 +34,8 @@ Pose = Sequence[float]
 """x, y, yaw: m, rad."""
 
 X, Y, THETA, FORWARD, TURN = range(5)
-STEP = 1e-30
 BENT_HEADING_VAR_RAD2 = 0.0027
+STEP = 1e-30
 """Of the complex derivative: its square vanishes beside 1, so that the result is exact to rounding."""
 
 NO_NOISE: Matrix = np.zeros((0, 0))
