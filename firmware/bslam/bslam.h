@@ -174,7 +174,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known data association: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or delayed
-    BSLAM_REASON_APPEARANCE,   ///< too far from any beacon to match, but it looks like one that may be here
+    BSLAM_REASON_APPEARANCE,   ///< a known beacon or a new one: in doubt, and no hypothesis is free
     BSLAM_REASON_GATE,         ///< its innovation is outside the gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room: see BSLAM_PLACE_MAX_M, too
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite

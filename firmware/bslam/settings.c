@@ -131,7 +131,6 @@ static void set_camera(bslam_settings_t *settings)
 {
     settings->huber_d = 1;
     settings->gate_d2 = 9;
-    settings->appearance_weight = 2;
     settings->new_per_m2 = BSLAM_R(0.003);
     if (settings->association != BSLAM_ASSOCIATION_KNOWN) {
         // The detector believes in things that are no beacon, mostly for a few metres of travel: a beacon

@@ -22,7 +22,7 @@
                         BSLAM_SIZE_BODY * (BSLAM_SIZE_BODY + 4) / 2 + 4) + \
      BSLAM_BEACONS_MAX * (64 + 6 * BSLAM_SIZE_REAL) + 48)
 /// The values of the settings.
-#define BSLAM_SIZE_SETTINGS (66 * BSLAM_SIZE_REAL + 64 + 2 * BSLAM_SIZE_POINTER)
+#define BSLAM_SIZE_SETTINGS (64 * BSLAM_SIZE_REAL + 64 + 2 * BSLAM_SIZE_POINTER)
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
@@ -43,7 +43,7 @@
     (848 + (BSLAM_SAMPLE_FLOAT ? 288 : 144) + BSLAM_SIZE_SAMPLES + \
      14 * (BSLAM_SAMPLES_PER_CLASSIFIER + BSLAM_NEGATIVES_MAX))
 #define BSLAM_SIZE_APPEARANCE \
-    (BSLAM_APPEARANCE * (BSLAM_BEACONS_MAX * 44 + BSLAM_LEARNER_SLOTS * BSLAM_SIZE_CLASSIFIER + \
+    (BSLAM_APPEARANCE * (BSLAM_BEACONS_MAX * 52 + BSLAM_LEARNER_SLOTS * BSLAM_SIZE_CLASSIFIER + \
                          BSLAM_SIZE_SAMPLES * BSLAM_SIZE_SAMPLE + BSLAM_SIZE_TRAINING + 104))
 
 /// The smoother: two filters, and the nodes of the path.
@@ -58,7 +58,7 @@
 
 /// Hypotheses besides the one in force: a filter each, what it knows of its beacons, and costs.
 #define BSLAM_SIZE_DOUBTS \
-    ((BSLAM_HYPOTHESES_MAX - 1) * (BSLAM_SIZE_EKF + 44 * BSLAM_BEACONS_MAX + \
+    ((BSLAM_HYPOTHESES_MAX - 1) * (BSLAM_SIZE_EKF + 52 * BSLAM_BEACONS_MAX + \
                                    (BSLAM_SIGHTINGS_MAX + 7) * BSLAM_SIZE_REAL + BSLAM_SIGHTINGS_MAX + 16) + \
      8)
 

@@ -1,8 +1,6 @@
 #include "kept_map.h"
 #include "plain_settings.h"
 
-enum { STEP_US = 40000 };
-
 bslam_settings_t kept_settings(void)
 {
     bslam_settings_t settings = unit_settings();
@@ -40,8 +38,8 @@ void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance)
 void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects)
 {
     kept_empty(slam, appearance);
-    for (int view = 1; view <= 12; view++) {
-        const int64_t now_us = (int64_t)view * STEP_US;
+    for (int view = 1; view <= KEPT_VIEWS; view++) {
+        const int64_t now_us = (int64_t)view * KEPT_STEP_US;
         const bslam_odometry_reading_t reading = {
             .source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us, .left_m = real(1e-4), .right_m = real(1e-4)};
         float signatures[6][BSLAM_SAMPLE_FEATURES];

@@ -7,6 +7,8 @@
 #include "support.h"
 
 enum { KEPT_BYTES_MAX = 65536 };
+/// kept_make's views, over a time in which a beacon is confirmed.
+enum { KEPT_VIEWS = 12, KEPT_STEP_US = 100000 };
 
 /// Settings of association by position and appearance.
 bslam_settings_t kept_settings(void);

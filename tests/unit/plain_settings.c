@@ -62,7 +62,5 @@ bslam_settings_t unit_settings(void)
     p.confirm_window_us = 0;
     p.existence_score = BSLAM_R(0.5);
     p.existence_sum = BSLAM_R(6.5);
-    p.existence_first_sum = 3;
-    p.existence_beacons = 4;
     return p;
 }

@@ -158,7 +158,7 @@ bslam_real_t bslam_appearance_odds(const bslam_appearance_t *appearance, const b
     const bslam_real_t odds =
         (bslam_real_t)(by->offset + by->distance * distance + by->value * value +
                        more * (by->more + by->more_distance * distance + by->more_value * value));
-    return settings->appearance_weight * (odds < -ODDS_MAX ? -ODDS_MAX : odds > ODDS_MAX ? ODDS_MAX : odds);
+    return odds < -ODDS_MAX ? -ODDS_MAX : odds > ODDS_MAX ? ODDS_MAX : odds;
 }
 
 // ---- classes ----------------------------------------------------------------------------------------------

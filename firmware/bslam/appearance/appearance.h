@@ -22,11 +22,13 @@ typedef struct bslam_beacon_appearance {
     bool is_trained;
     uint32_t trained_um;                        ///< distance travelled when it was trained last
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];  ///< how often as which class, from 1 on
-    uint32_t missed_um;                         ///< distance travelled when it was seen last, or not expected
-    uint8_t missed;                             ///< from how many directions, since it was seen last
+    uint32_t viewed_us;  ///< when it was matched last, used or not: the clock's lower half
+    uint32_t missed_um;  ///< distance travelled when it was seen last, or not expected
+    uint8_t missed;      ///< from how many directions, since it was seen last
     uint8_t
         seen_from[BSLAM_APPEARANCE_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
     uint8_t view_frames;  ///< in which it was matched since it came into view, as far as they count
+    float view_looks;     ///< what appearance said for it, on the mean of them
 } bslam_beacon_appearance_t;
 
 /// What a sighting's appearance says of a beacon.

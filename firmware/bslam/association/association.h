@@ -27,6 +27,7 @@ typedef struct bslam_match {
     bslam_real_t lead;         ///< by how much the choice leads any other
     bool is_match;             ///< within a method: it has a beacon that it may be
     bool sure;                 ///< enough to learn from
+    bool slipped;              ///< it takes a slip of the wheels to be that beacon
     bool range_used;  ///< within a frame: the distance has said where on a ray the beacon is, or does not fit
 } bslam_match_t;
 
@@ -38,12 +39,15 @@ typedef struct bslam_record {
     bslam_innovation_t innovation;  ///< of what is fused
 } bslam_record_t;
 
+/// Nats that a slip of the wheels costs, of which the filter knows nothing.
+#define BSLAM_SLIP_NATS 5
 /// In place of a beacon: a new one.
 #define BSLAM_CHOICE_NEW (-1)
 
 /// What a hypothesis may not choose: MATH "Which beacon is it".
 typedef struct bslam_bar {
-    int sighting, beacon;
+    int sighting, count;
+    int choices[BSLAM_HYPOTHESES_MAX];
 } bslam_bar_t;
 
 /// All a method may look at.

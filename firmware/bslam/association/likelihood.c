@@ -10,8 +10,8 @@ static const bslam_real_t AGAIN_ODDS = BSLAM_R(4.2);
 enum { AGAIN_US = 200000 };
 // A choice that leads by this much stays, whatever else the frame shows.
 static const bslam_real_t CLEAR_LEAD = 4;
-// Beyond the candidates a beacon may be up to here that a slip of the wheels has left behind.
-static const bslam_real_t FAR_D2 = 300;
+// What a slip of the wheels does, which the filter knows nothing of: to the robot's place and its heading.
+static const bslam_real_t SLIP_VAR_M2 = 1, SLIP_VAR_RAD2 = BSLAM_R(0.25);
 // A classifier learns from no match that is farther off: it may be another's.
 static const bslam_real_t SURE_D2 = 9;
 
@@ -19,6 +19,7 @@ static const bslam_real_t SURE_D2 = 9;
 typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against one that is not in the map
     bslam_real_t distance2, log_density, looks;
+    bool slipped;
 } candidate_t;
 
 /// Log density of beacons that are not in the map, in the units of a sighting: 1/(m rad), or 1/rad.
@@ -63,12 +64,27 @@ static bslam_real_t looks_of(const bslam_sighting_frame_t *frame, const bslam_si
 /// Whether a hypothesis may not take a sighting for a beacon; CHOICE_NEW: for a new one.
 static bool is_barred(const bslam_sighting_frame_t *frame, int i, int beacon)
 {
-    return frame->bar != NULL && frame->bar->sighting == i && frame->bar->beacon == beacon;
+    const bslam_bar_t *bar = frame->bar;
+    bool barred = false;
+    for (int k = 0; bar != NULL && bar->sighting == i && k < bar->count; k++) {
+        barred = barred || bar->choices[k] == beacon;
+    }
+    return barred;
+}
+
+/// The robot may be elsewhere by what a slip does.
+static void doubt_place(const bslam_sighting_t *sighting, const bslam_settings_t *settings,
+                        bslam_innovation_t *innovation)
+{
+    const bslam_real_t per_m =
+        sighting->has_range ? 1 / sighting->range_m : settings->ray_inverse_distance_per_m;
+    innovation->range_var_m2 += SLIP_VAR_M2;
+    innovation->bearing_var_rad2 += SLIP_VAR_RAD2 + SLIP_VAR_M2 * per_m * per_m;
 }
 
 /// Weighs a sighting against a beacon, conditional on the matches so far. False if it is no candidate.
 static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i, int beacon,
-                  const bslam_sample_t *sample, bslam_real_t limit_d2, candidate_t *found)
+                  const bslam_sample_t *sample, bool may_slip, candidate_t *found)
 {
     const bslam_sighting_t *sighting = &frame->sightings[i];
     const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
@@ -78,16 +94,25 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     const bool is_another = frame->appearance == NULL && bslam_ekf_classes_differ(other, sighting);
     if (is_another || is_barred(frame, i, beacon) ||
         bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, &taken, beacon, &innovation) !=
-            BSLAM_OK ||
-        bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) != BSLAM_OK ||
-        weight.distance2 > limit_d2) {
+            BSLAM_OK) {
+        return false;
+    }
+    if (bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) != BSLAM_OK) {
         return false;
     }
     found->distance2 = weight.distance2;
+    found->slipped = false;
+    if (may_slip && weight.distance2 > frame->settings->candidate_d2) {
+        doubt_place(&taken, frame->settings, &innovation);
+        found->slipped = bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) == BSLAM_OK;
+    }
+    if (weight.distance2 > frame->settings->candidate_d2) {
+        return false;
+    }
     found->log_density = weight.log_density + log_lost(&taken, sighting);
     found->looks = looks_of(frame, sighting, beacon, sample);
     found->score = found->log_density - log_new(frame->settings, sighting) + found->looks +
-                   again_odds(frame, sighting, beacon);
+                   again_odds(frame, sighting, beacon) - (found->slipped ? BSLAM_SLIP_NATS : 0);
     return true;
 }
 
@@ -118,12 +143,13 @@ static void choose(bslam_match_t *match, int beacon, const candidate_t *best)
     match->distance2 = best->distance2;
     match->log_density = best->log_density;
     match->looks = best->looks;
+    match->slipped = best->slipped;
     match->score = best->score;
 }
 
 /// Finds the best beacon of a sighting among those that are not taken, and by how much it leads.
 static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                      bslam_record_t *records)
+                      bool may_slip, bslam_record_t *records)
 {
     bslam_match_t *match = &records[i].match;
     bslam_sample_t buffer;
@@ -133,8 +159,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *
     match->score = NO_SCORE;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         candidate_t one;
-        if (is_taken(frame, records, b) ||
-            !weigh(frame, conditional, i, b, sample, frame->settings->candidate_d2, &one)) {
+        if (is_taken(frame, records, b) || !weigh(frame, conditional, i, b, sample, may_slip, &one)) {
             continue;
         }
         if (one.score > match->score) {
@@ -184,22 +209,34 @@ static void condition_on(const bslam_sighting_frame_t *frame, bslam_conditional_
 
 /// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
 /// made anew, conditional on the matches so far.
-static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional,
+static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, bool may_slip,
                    bslam_record_t *records)
 {
     for (int next = next_to_settle(records, frame->count); next >= 0;
          next = next_to_settle(records, frame->count)) {
         bslam_match_t *match = &records[next].match;
         match->verdict = BSLAM_VERDICT_MATCH;
-        match->sure = match->distance2 <= SURE_D2 && match->lead >= CLEAR_LEAD;
+        match->sure = match->distance2 <= SURE_D2 && match->lead >= CLEAR_LEAD && !match->slipped;
         condition_on(frame, conditional, next, match);
         for (int i = 0; i < frame->count; i++) {
             const bool is_clear = records[i].match.lead >= CLEAR_LEAD && !frame->is_exact;
             if (is_open(&records[i].match) && (!is_clear || records[i].match.beacon == match->beacon)) {
-                find_best(frame, conditional, i, records);
+                find_best(frame, conditional, i, may_slip, records);
             }
         }
     }
+}
+
+/// Matches what is open, as far as there are beacons for it.
+static void match_open(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, bool may_slip,
+                       bslam_record_t *records)
+{
+    for (int i = 0; i < frame->count; i++) {
+        if (is_open(&records[i].match)) {
+            find_best(frame, conditional, i, may_slip, records);
+        }
+    }
+    settle(frame, conditional, may_slip, records);
 }
 
 /// Whether a match with a beacon that counts says that the robot is where the filter has it.
@@ -208,23 +245,6 @@ static bool is_held(const bslam_sighting_frame_t *frame, const bslam_record_t *r
     for (int i = 0; i < frame->count; i++) {
         if (records[i].match.verdict == BSLAM_VERDICT_MATCH && records[i].match.distance2 <= SURE_D2 &&
             frame->ekf->beacons[records[i].match.beacon].confirmed) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/// Whether a sighting clearly resembles a beacon that could be here, though it is no candidate. If nothing
-/// else is where it should be, the wheels slipped, rather than that there is a new one.
-static bool resembles_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                              const bslam_record_t *records)
-{
-    bslam_sample_t buffer;
-    const bslam_sample_t *sample = sample_of(frame, i, &buffer);
-    for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
-        candidate_t one;
-        if (!is_taken(frame, records, b) && weigh(frame, conditional, i, b, sample, FAR_D2, &one) &&
-            one.looks >= CLEAR_LEAD) {
             return true;
         }
     }
@@ -250,18 +270,12 @@ void bslam_associate_likely(const bslam_sighting_frame_t *frame, bslam_record_t 
             records[i].match.verdict = BSLAM_VERDICT_DEFER;
         }
     }
+    match_open(frame, &conditional, false, records);
+    if (frame->appearance != NULL && !is_held(frame, records)) {
+        match_open(frame, &conditional, true, records);
+    }
     for (int i = 0; i < frame->count; i++) {
         if (is_open(&records[i].match)) {
-            find_best(frame, &conditional, i, records);
-        }
-    }
-    settle(frame, &conditional, records);
-    for (int i = 0; i < frame->count; i++) {
-        if (is_open(&records[i].match) && !is_held(frame, records) &&
-            resembles_another(frame, &conditional, i, records)) {
-            records[i].match.reason = BSLAM_REASON_APPEARANCE;
-            records[i].match.beacon = -1;
-        } else if (is_open(&records[i].match)) {
             take_for_new(frame, i, &records[i].match);
         }
     }

@@ -9,16 +9,13 @@
     REAL(candidate_d2, 30.0, 1e-3, 1e6, "beacons nearer than this are candidates") \
     REAL(new_per_m2, 0.002, 1e-9, 1e3, "density of beacons not yet in the map") \
     REAL(new_per_rad, 0.3, 1e-9, 1e3, "the same, bearing-only") \
-    REAL(appearance_weight, 1.0, 0.0, 100.0, "what appearance counts against position (0: nothing)") \
     REAL(duplicate_sd_m, 0.1, 0.0, 1e3, "the places of two beacons that are one differ by about this") \
     INTEGER(hypotheses, 2, 1, 8, "that are followed at most while it is in doubt which beacon is seen") \
     INTEGER(doubt_us, 5000000, 0, 60000000, "for so long a doubt lasts at most") \
     REAL(doubt_nats, 6.0, 0.0, 100.0, "a choice that leads by less begins one") \
     INTEGER(missed_views, 3, 0, 32, "one missed from so many known viewpoints is removed (0: never)") \
     REAL(existence_score, 0.5, -100.0, 100.0, "a detector's score above this is evidence of existence") \
-    REAL(existence_sum, 6.5, 0.0, 1e6, "a beacon is neither confirmed nor used below this evidence") \
-    REAL(existence_first_sum, 3.0, 0.0, 1e6, "used from this on") \
-    INTEGER(existence_beacons, 4, 0, 250, "while fewer than so many are confirmed")
+    REAL(existence_sum, 6.5, 0.0, 1e6, "a beacon is neither confirmed nor used below this evidence")
 // clang-format on
 
 #endif

@@ -11,7 +11,7 @@ static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 
 // Where identity is not told, a beacon that was seen for less may be one that was not recognised for a
 // moment.
-enum { LASTING_US = 300000 };
+enum { LASTING_US = 1000000 };
 
 /// Whether a sighting's score counts: where appearance decides, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
@@ -92,21 +92,9 @@ void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const 
     decide(slam, beacon);
 }
 
-/// A robot that knows few places loses more by waiting.
-static bool knows_few(const bslam_slam_t *slam)
-{
-    int confirmed = 0;
-    for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        confirmed += slam->ekf.beacons[b].confirmed ? 1 : 0;
-    }
-    return confirmed < slam->settings.existence_beacons;
-}
-
 static bool is_tentative(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
-    const bslam_settings_t *settings = &slam->settings;
-    return !beacon->confirmed && beacon->has_scores &&
-           beacon->score_sum < (knows_few(slam) ? settings->existence_first_sum : settings->existence_sum);
+    return !beacon->confirmed && beacon->has_scores && beacon->score_sum < slam->settings.existence_sum;
 }
 
 void bslam_slam_mark_tentative(bslam_slam_t *slam, int count)

@@ -8,6 +8,8 @@
 #include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+// Of a view so many frames speak of appearance: they err together.
+enum { VIEW_FRAMES = 5 };
 
 // ---- from where a frame was taken -------------------------------------------------------------------------
 
@@ -219,8 +221,9 @@ static void begin_views(bslam_slam_t *slam, int64_t time_us, int count)
     for (int i = 0; i < count && bslam_slam_learns(slam); i++) {
         const bslam_match_t *match = &slam->records[i].match;
         if (match->verdict == BSLAM_VERDICT_MATCH &&
-            time_us - slam->ekf.beacons[match->beacon].last_seen_us > BSLAM_VIEW_US) {
+            (uint32_t)time_us - slam->appearance->of[match->beacon].viewed_us > BSLAM_VIEW_US) {
             slam->appearance->of[match->beacon].view_frames = 0;
+            slam->appearance->of[match->beacon].view_looks = 0;
         }
     }
 }
@@ -351,14 +354,22 @@ bool bslam_slam_was_tentative(const bslam_account_t *account)
     return account->reason == BSLAM_REASON_TENTATIVE && account->has_beacon;
 }
 
-/// In how many frames of its view a beacon was matched, as far as they count.
-static void count_views(bslam_slam_t *slam, int count)
+bslam_real_t bslam_slam_view_gain(const bslam_beacon_appearance_t *of, bslam_real_t looks)
+{
+    return of->view_frames < VIEW_FRAMES ? (looks - of->view_looks) / (bslam_real_t)(of->view_frames + 1) : 0;
+}
+
+/// In how many frames of its view a beacon was matched, as far as they count; used or not.
+static void count_views(bslam_slam_t *slam, int64_t time_us, int count)
 {
     for (int i = 0; i < count && bslam_slam_learns(slam); i++) {
-        const bslam_account_t *account = slam->records[i].account;
-        if (account->outcome == BSLAM_OUTCOME_MATCHED || bslam_slam_was_tentative(account)) {
-            uint8_t *frames = &slam->appearance->of[slam->records[i].match.beacon].view_frames;
-            *frames = (uint8_t)(*frames + (*frames < BSLAM_VIEW_FRAMES ? 1 : 0));
+        const bslam_match_t *match = &slam->records[i].match;
+        if (match->beacon >= 0 &&
+            (match->verdict == BSLAM_VERDICT_MATCH || match->verdict == BSLAM_VERDICT_TENTATIVE)) {
+            bslam_beacon_appearance_t *of = &slam->appearance->of[match->beacon];
+            of->viewed_us = (uint32_t)time_us;
+            of->view_looks += (float)bslam_slam_view_gain(of, match->looks);
+            of->view_frames = (uint8_t)(of->view_frames + (of->view_frames < VIEW_FRAMES ? 1 : 0));
         }
     }
 }
@@ -438,5 +449,5 @@ void bslam_slam_use_associated(bslam_slam_t *slam, const bslam_vantage_t *vantag
 {
     bslam_slam_mark_tentative(slam, count);
     use_matches(slam, vantage, count);  // measure, fuse, correct, augment
-    count_views(slam, count);
+    count_views(slam, vantage->moment_us, count);
 }

@@ -95,8 +95,9 @@ typedef struct bslam_vantage {
 
 /// A beacon that was not seen for so long comes into view anew.
 #define BSLAM_VIEW_US 1000000
-/// So many frames of a view tell what a beacon looks like.
-#define BSLAM_VIEW_FRAMES 5
+
+/// By how much another frame moves what appearance says of a view: the mean of its first frames' log odds.
+bslam_real_t bslam_slam_view_gain(const bslam_beacon_appearance_t *of, bslam_real_t looks);
 
 /// Decides which beacons a frame's sightings show, but for what is barred; NULL: nothing is.
 void bslam_slam_associate(bslam_slam_t *slam, const bslam_vantage_t *vantage,

@@ -7,8 +7,6 @@
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 // A sighting that is not used says nothing between two hypotheses.
 static const bslam_real_t UNUSED = BSLAM_R(1e30);
-// A view's frames err together: they say as much as one, in so many parts.
-static const bslam_real_t VIEW_FRAMES = BSLAM_VIEW_FRAMES;
 
 // ---- from where a frame was taken -------------------------------------------------------------------------
 
@@ -52,16 +50,22 @@ static bslam_vantage_t vantage_of(const bslam_slam_t *slam, int64_t behind_us)
 
 // ---- hypotheses -------------------------------------------------------------------------------------------
 
+/// Whether a match is a choice: of a beacon, or a new one.
+static bool is_made(const bslam_match_t *match)
+{
+    return match->verdict == BSLAM_VERDICT_MATCH || match->verdict == BSLAM_VERDICT_NEW;
+}
+
 /// What a hypothesis pays for each sighting, in nats.
 static void note_costs(const bslam_slam_t *slam, int count, bslam_real_t *cost)
 {
     for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->records[i].match;
-        const bool is_match = match->verdict == BSLAM_VERDICT_MATCH;
-        cost[i] = is_match || match->verdict == BSLAM_VERDICT_NEW ? -match->log_density : UNUSED;
-        if (is_match && bslam_slam_learns(slam) &&
-            slam->appearance->of[match->beacon].view_frames < BSLAM_VIEW_FRAMES) {
-            cost[i] -= match->looks / VIEW_FRAMES;
+        cost[i] = is_made(match) ? -match->log_density : UNUSED;
+        if (match->verdict == BSLAM_VERDICT_MATCH && bslam_slam_learns(slam)) {
+            const bslam_beacon_appearance_t *of = &slam->appearance->of[match->beacon];
+            cost[i] -= bslam_slam_view_gain(of, match->looks);
+            cost[i] += match->slipped && of->view_frames == 0 ? BSLAM_SLIP_NATS : 0;
         }
     }
 }
@@ -79,6 +83,18 @@ static void compare(const bslam_slam_t *slam, bslam_hypothesis_t *other, const b
     }
 }
 
+/// A new beacon that may be a known one waits, unless another hypothesis takes it for that: sighting `but`.
+static void wait_with_new(bslam_slam_t *slam, int count, int but)
+{
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->records[i].match;
+        if (match->verdict == BSLAM_VERDICT_NEW && i != but && match->lead < slam->settings.doubt_nats) {
+            match->verdict = BSLAM_VERDICT_DEFER;
+            match->reason = BSLAM_REASON_APPEARANCE;
+        }
+    }
+}
+
 /// A frame as another hypothesis takes it. Counters are those of the one in force.
 static void take_turn(bslam_slam_t *slam, bslam_hypothesis_t *hypothesis, const bslam_bar_t *bar,
                       const bslam_vantage_t *vantage, const bslam_sighting_t *sightings, int count)
@@ -86,6 +102,7 @@ static void take_turn(bslam_slam_t *slam, bslam_hypothesis_t *hypothesis, const 
     const bslam_slam_counters_t counters = slam->counters;
     bslam_hypothesis_exchange(slam, hypothesis);
     bslam_slam_associate(slam, vantage, sightings, count, bar);
+    wait_with_new(slam, count, bar != NULL ? bar->sighting : -1);
     note_costs(slam, count, hypothesis->cost);
     for (int i = 0; i < count; i++) {
         hypothesis->is_new[i] = slam->records[i].match.verdict == BSLAM_VERDICT_NEW;
@@ -114,6 +131,34 @@ static int doubtful(const bslam_slam_t *slam, int64_t time_us, int count)
     return least;
 }
 
+static bool has_room(const bslam_slam_t *slam)
+{
+    const int most =
+        slam->settings.hypotheses < BSLAM_HYPOTHESES_MAX ? slam->settings.hypotheses : BSLAM_HYPOTHESES_MAX;
+    return slam->doubts->count + 1 < most;
+}
+
+/// Begins a hypothesis for every other choice of a sighting that is near enough to the one in force.
+static void branch(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sightings,
+                   int count, int i)
+{
+    bslam_bar_t bar = {.sighting = i};
+    const bslam_match_t *match = &slam->records[i].match;
+    bslam_real_t gap = match->lead;
+    while (gap < slam->settings.doubt_nats && has_room(slam) &&
+           (is_made(match) || match->verdict == BSLAM_VERDICT_TENTATIVE)) {
+        bslam_hypothesis_t *other = &slam->doubts->others[slam->doubts->count];
+        bar.choices[bar.count++] = match->beacon;
+        bslam_hypothesis_copy(slam, other);
+        other->since_us = vantage->moment_us;
+        other->behind = 0;
+        slam->doubts->count++;
+        bslam_hypotheses_share(slam);
+        take_turn(slam, other, &bar, vantage, sightings, count);
+        gap += match->lead;
+    }
+}
+
 /// bslam_slam_associate for the hypothesis in force, once the others have taken the frame. A doubtful choice
 /// begins another one.
 static void follow_doubts(bslam_slam_t *slam, const bslam_vantage_t *vantage,
@@ -130,18 +175,12 @@ static void follow_doubts(bslam_slam_t *slam, const bslam_vantage_t *vantage,
         take_turn(slam, &doubts->others[k], NULL, vantage, sightings, count);
     }
     bslam_slam_associate(slam, vantage, sightings, count, NULL);
-    const int i = doubtful(slam, time_us, count);
-    if (i >= 0 && doubts->count + 1 < slam->settings.hypotheses && doubts->count + 1 < BSLAM_HYPOTHESES_MAX) {
-        bslam_hypothesis_t *other = &doubts->others[doubts->count];
-        const bslam_bar_t bar = {i, slam->records[i].match.beacon};
-        bslam_hypothesis_copy(slam, other);
-        other->since_us = time_us;
-        other->behind = 0;
-        doubts->count++;
-        bslam_hypotheses_share(slam);
-        take_turn(slam, other, &bar, vantage, sightings, count);
+    const int i = has_room(slam) ? doubtful(slam, time_us, count) : -1;
+    if (i >= 0) {
+        branch(slam, vantage, sightings, count, i);
         bslam_slam_associate(slam, vantage, sightings, count, NULL);
     }
+    wait_with_new(slam, count, i);
     bslam_real_t cost[BSLAM_SIGHTINGS_MAX];
     note_costs(slam, count, cost);
     for (int k = 0; k < doubts->count; k++) {

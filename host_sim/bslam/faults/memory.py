@@ -243,8 +243,9 @@ def _bad_merge(protected: bool) -> Measured:
     return Measured(False, f"{len(merged.shared)} beacons of one room taken for those of another")
 
 
-# Of a machine's store alone: where a thing stands says which one it is.
-_STORE = {"association": 3, "appearance_weight": 0.0, "learn_budget": 100_000, "missed_views": 0}
+# Of a machine's store alone: where a thing stands says which one it is, since nothing is new.
+_STORE = {"association": 3, "new_per_m2": 1e-9, "learn_budget": 100_000, "missed_views": 0}
+_VIEW_US = 2 * STEP_US  # so that sixteen views last for the second that a beacon needs
 _STEP_M = 0.11  # a view is learned once the robot has gone 0.1 m: it goes to and fro
 
 
@@ -264,12 +265,12 @@ def _full_store(protected: bool) -> Measured:
         shown = shown[-16:]
     for step, (one, strange) in enumerate(zip(shown, views(rival, len(shown)), strict=True)):
         way_m = _STEP_M if step % 2 else -_STEP_M
-        slam.odometry("wheels", step * STEP_US, way_m, way_m)
+        slam.odometry("wheels", step * _VIEW_US, way_m, way_m)
         both = np.stack([one, strange])
         ahead_m = 2.0 - (_STEP_M if step % 2 else 0.0)
         range_m, bearing_rad = math.hypot(ahead_m, 1.0), math.atan2(1.0, ahead_m)
         places = ([bearing_rad, -bearing_rad], [range_m, range_m])
-        slam.sightings(step * STEP_US, *places, [-1, -1], [True, True], signature=both)
+        slam.sightings(step * _VIEW_US, *places, [-1, -1], [True, True], signature=both)
     kept = parse(slam.save_map())
     owner = next(one.machine for one in kept.beacons if one.y_m > 0)
     assert owner is not None

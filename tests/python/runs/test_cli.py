@@ -279,7 +279,7 @@ def test_params_lists_every_parameter_with_default_and_meaning(capsys):
     names = [one.name for one in Slam.parameters() if one.group != "tuning"]
     assert [line.split()[0] for line in lines if " to " in line[:70]] == names
     assert main(["params", "--all"]) == 0
-    assert "appearance_weight" in capsys.readouterr().out
+    assert "doubt_nats" in capsys.readouterr().out
 
 
 def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):

@@ -110,7 +110,7 @@ def test_a_map_goes_to_the_host_and_to_another_robot_which_finds_itself_in_it(ro
 
 def test_a_score_that_is_sent_puts_a_beacon_on_trial_as_on_the_host(robot_line):
     told = []
-    with RemoteSlam(robot_line(), {"association": 3, "existence_beacons": 0}, 20) as robot:
+    with RemoteSlam(robot_line(), {"association": 3}, 20) as robot:
         for slam in (robot, Slam(robot.host_params, beacons_max=20)):
             told.append([])
             for step in range(8):

@@ -275,11 +275,10 @@ static const int32_t METHODS[] = {BSLAM_ASSOCIATION_SVM, BSLAM_ASSOCIATION_NEARE
                                   BSLAM_ASSOCIATION_CENTROID, BSLAM_ASSOCIATION_BOTH};
 
 /// What a method says of a sample whose first feature is this, the others 0.
-static double odds_by(int32_t association, double weight, double first)
+static double odds_by(int32_t association, double first)
 {
     bslam_settings_t settings = unit_settings();
     settings.association = association;
-    settings.appearance_weight = real(weight);
     const float signature[BSLAM_SAMPLE_FEATURES] = {(float)first};
     bslam_sample_t sample;
     assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
@@ -308,9 +307,7 @@ static void test_odds_are_by_the_methods_coefficients(void **state)
             (double)by->offset + (double)by->distance * distance + (double)by->value * value +
             more * ((double)by->more + (double)by->more_distance * distance + (double)by->more_value * value);
         assert_true(fabs(expected) < 8);
-        assert_near(odds_by(METHODS[k], 1, 0.9), expected, 0.1);  // features are stored in eight bits
-        assert_near(odds_by(METHODS[k], 0.5, 0.9), 0.5 * odds_by(METHODS[k], 1, 0.9), 1e-6);
-        assert_near(odds_by(METHODS[k], 0, 0.9), 0, 0);
+        assert_near(odds_by(METHODS[k], 0.9), expected, 0.1);  // features are stored in eight bits
     }
 }
 
@@ -318,26 +315,25 @@ static void test_odds_are_for_what_looks_alike_and_against_what_does_not(void **
 {
     know_two_samples(2);
     for (int k = 0; k < COUNT_OF(METHODS); k++) {
-        assert_true(odds_by(METHODS[k], 1, 0.6) > 0);
-        assert_true(odds_by(METHODS[k], 1, -0.6) < 0);
+        assert_true(odds_by(METHODS[k], 0.6) > 0);
+        assert_true(odds_by(METHODS[k], -0.6) < 0);
     }
 }
 
-static void test_odds_are_clipped_before_they_are_weighted(void **state)
+static void test_odds_are_clipped(void **state)
 {
     unit_give_machine(&appearance, 0, 10, 3);
-    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, 1), 8, 1e-6);
-    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, -1), -8, 1e-6);
-    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 2, -1), -16, 1e-6);
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1), 8, 1e-6);
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, -1), -8, 1e-6);
 }
 
 static void test_a_classifier_that_knows_nothing_says_nothing(void **state)
 {
-    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1, 1), 0, 0);  // it has none
+    assert_near(odds_by(BSLAM_ASSOCIATION_SVM, 1), 0, 0);  // it has none
     unit_give_machine(&appearance, 0, 10, 3);
     appearance.learner.classifiers[0].negatives = 0;  // nothing to tell the beacon from
     for (int k = 0; k < COUNT_OF(METHODS); k++) {
-        assert_near(odds_by(METHODS[k], 1, 1), 0, 0);
+        assert_near(odds_by(METHODS[k], 1), 0, 0);
     }
 }
 
@@ -457,7 +453,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_class_count_beyond_the_limit_comes_down_and_never_wraps, setup),
         cmocka_unit_test_setup(test_odds_are_by_the_methods_coefficients, setup),
         cmocka_unit_test_setup(test_odds_are_for_what_looks_alike_and_against_what_does_not, setup),
-        cmocka_unit_test_setup(test_odds_are_clipped_before_they_are_weighted, setup),
+        cmocka_unit_test_setup(test_odds_are_clipped, setup),
         cmocka_unit_test_setup(test_a_classifier_that_knows_nothing_says_nothing, setup),
         cmocka_unit_test_setup(test_while_hypotheses_share_the_classifiers_none_leaves, setup),
         cmocka_unit_test_setup(test_a_classifier_that_leaves_late_is_no_twin_either, setup),

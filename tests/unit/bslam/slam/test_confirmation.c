@@ -6,7 +6,7 @@
 #include "bslam/slam/slam.h"
 #include "plain_settings.h"
 
-enum { STEP_US = 300000 };  // a beacon is confirmed no sooner
+enum { LASTING_US = 1000000, STEP_US = LASTING_US / 2 };  // three sightings last for long enough
 
 static bslam_slam_t slam;
 static int64_t now_us;
@@ -17,10 +17,11 @@ static void start(int32_t association)
     settings.association = association;
     settings.existence_score = BSLAM_R(0.5);
     settings.existence_sum = 4;
-    settings.existence_first_sum = 2;
-    settings.existence_beacons = 0;
     settings.confirm_sightings = 3;
     settings.confirm_window_us = 0;
+    // A heading stays known over a step well enough for a match.
+    settings.left_speed_sd_mps = BSLAM_R(0.18);
+    settings.right_speed_sd_mps = BSLAM_R(0.12);
     int bad_id;
     memset(&slam, 0, sizeof slam);
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
@@ -33,17 +34,22 @@ static int setup(void **state)
     return 0;
 }
 
-/// The robot stands, and sees one thing with this score; what became of it.
-static bslam_account_t see_at(double bearing_rad, double score)
+/// The robot stands, and sees one thing with this score, so long after the frame before; what became of it.
+static bslam_account_t see_after(int64_t us, double bearing_rad, double score)
 {
-    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    now_us += us;
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
     bslam_sighting_t seen =
         unit_polar(bearing_rad, 4, slam.settings.association == BSLAM_ASSOCIATION_KNOWN ? 1 : -1);
     seen.score = real(score);
-    now_us += STEP_US;
     assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
     assert_int_equal(bslam_slam_sightings(&slam, now_us, &seen, 1), BSLAM_OK);
     return slam.accounts[0];
+}
+
+static bslam_account_t see_at(double bearing_rad, double score)
+{
+    return see_after(STEP_US, bearing_rad, score);
 }
 
 /// Where the next frame would leave the filter if it showed nothing.
@@ -192,23 +198,38 @@ static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
     assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);
 }
 
-/// One that becomes confirmed in a frame does not change what becomes of the others in it.
+/// The robot stands, and sees two things, of which one, sighting `surer` of the frame, has the better score.
+static void see_both(int surer)
+{
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    bslam_sighting_t seen[2];
+    seen[surer] = unit_polar(0.2, 4, -1);
+    seen[surer].score = BSLAM_R(1.5);
+    seen[1 - surer] = unit_polar(-0.8, 4, -1);
+    seen[1 - surer].score = BSLAM_R(1.25);
+    now_us += STEP_US;
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us, seen, 2), BSLAM_OK);
+}
+
+/// One that becomes confirmed in a frame is not used in it yet, nor does it change what becomes of the other.
 static void test_the_order_of_a_frame_does_not_matter(void **state)
 {
-    slam.settings.existence_beacons = 1;
-    for (int i = 0; i < 3; i++) {
-        (void)see(1.5);
+    for (int surer = 0; surer < 2; surer++) {
+        start(BSLAM_ASSOCIATION_SVM);
+        for (int i = 0; i < 3; i++) {
+            see_both(surer);
+        }
+        assert_false(is_confirmed(surer));
+        see_both(surer);
+        assert_true(is_confirmed(surer));
+        assert_false(is_confirmed(1 - surer));
+        assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_TENTATIVE);
+        assert_int_equal(slam.accounts[1].reason, BSLAM_REASON_TENTATIVE);
+        see_both(surer);
+        assert_int_equal(slam.accounts[surer].outcome, BSLAM_OUTCOME_MATCHED);
+        assert_int_equal(slam.accounts[1 - surer].reason, BSLAM_REASON_TENTATIVE);
     }
-    for (int i = 0; i < 3; i++) {
-        (void)see_at(-0.8, 1.25);
-    }
-    bslam_sighting_t seen[] = {unit_polar(0.2, 4, -1), unit_polar(-0.8, 4, -1)};
-    seen[0].score = BSLAM_R(1.5);
-    seen[1].score = BSLAM_R(0.6);
-    assert_false(is_confirmed(0));
-    assert_int_equal(bslam_slam_sightings(&slam, now_us + 1, seen, 2), BSLAM_OK);
-    assert_true(is_confirmed(0));
-    assert_int_equal(slam.accounts[1].outcome, BSLAM_OUTCOME_MATCHED);
 }
 
 static void test_views_do_not_run_over_while_scores_are_missing(void **state)
@@ -232,21 +253,25 @@ static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **sta
     assert_true(is_confirmed(0));
 }
 
-/// A robot that knows no place yet is content with less: two sightings of 1, and not four.
-static void test_while_few_are_confirmed_less_is_believed(void **state)
+/// What was not recognised for a moment is no beacon; where one sighting is enough, or identity is told, none
+/// is waited for.
+static void test_by_likelihood_a_beacon_is_seen_for_a_second(void **state)
 {
-    slam.settings.existence_beacons = 1;
-    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_NEW);
-    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_DEFERRED);
-    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    slam.settings.confirm_sightings = 2;
+    (void)see(0);
+    (void)see_after(LASTING_US - 1, 0.2, 0);
     assert_false(is_confirmed(0));
-    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    (void)see_after(1, 0.2, 0);
     assert_true(is_confirmed(0));
-    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_NEW);
-    for (int i = 0; i < 3; i++) {
-        assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_DEFERRED);
-    }
-    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    start(BSLAM_ASSOCIATION_SVM);
+    slam.settings.confirm_sightings = 1;
+    (void)see(0);
+    assert_true(is_confirmed(0));
+    start(BSLAM_ASSOCIATION_KNOWN);
+    slam.settings.confirm_sightings = 2;
+    (void)see(0);
+    (void)see_after(1, 0.2, 0);
+    assert_true(is_confirmed(0));
 }
 
 /// The robot stands, and sees one thing in this direction without a distance.
@@ -334,7 +359,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_sighting_beyond_the_gate_does_not_speak_for_it, setup),
         cmocka_unit_test_setup(test_the_order_of_a_frame_does_not_matter, setup),
         cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),
-        cmocka_unit_test_setup(test_while_few_are_confirmed_less_is_believed, setup),
+        cmocka_unit_test_setup(test_by_likelihood_a_beacon_is_seen_for_a_second, setup),
         cmocka_unit_test_setup(test_without_the_distance_that_others_have_a_score_says_little_for_it, setup),
         cmocka_unit_test_setup(test_a_distance_later_in_the_frame_counts_as_much, setup),
         cmocka_unit_test_setup(test_a_new_start_knows_of_no_distances, setup),

@@ -13,6 +13,7 @@ enum { STEP_US = 40000 };
 
 /// Two beacons, 4 m ahead; a heading that is off by as much makes one the other.
 static const double LEFT_RAD = 0.1, RIGHT_RAD = -0.1, RANGE_M = 4.02, DOUBTFUL_RAD = 0.02;
+static const double NEARLY_LEFT_RAD = 0.06, BESIDE_RAD = 0.095;
 /// The heading if it is the left one that is seen at DOUBTFUL_RAD, or the right one.
 static const double IF_LEFT_RAD = 0.08, IF_RIGHT_RAD = -0.12;
 
@@ -21,6 +22,7 @@ static bslam_doubts_t doubts;
 static bslam_appearance_t appearance;
 static int64_t now_us;
 static bslam_real_t step_m;
+static const float *signature;  // of all that is seen
 
 static void start(int32_t association, int32_t hypotheses)
 {
@@ -38,6 +40,7 @@ static void start(int32_t association, int32_t hypotheses)
     bslam_slam_attach_doubts(&slam, &doubts);
     now_us = 0;
     step_m = 0;
+    signature = NULL;
 }
 
 static int setup(void **state)
@@ -52,6 +55,7 @@ static void see(int frames, const double *bearings_rad, int count)
     bslam_sighting_t seen[4];
     for (int i = 0; i < count; i++) {
         seen[i] = unit_polar(bearings_rad[i], RANGE_M, -1);
+        seen[i].signature = signature;
     }
     for (int k = 0; k < frames; k++) {
         now_us += STEP_US;
@@ -76,12 +80,18 @@ static void doubt_heading(void)
     assert_int_equal(bslam_slam_set_pose(&slam, &origin, BSLAM_R(0.01), BSLAM_R(0.15)), BSLAM_OK);
 }
 
-/// Both beacons are known and out of view.
-static void know_two(void)
+/// Both beacons are known and out of view, and the robot knows where it is.
+static void know_places(void)
 {
     see_both_from(0, 10);
     assert_int_equal(slam.ekf.beacon_count, 2);
     see(30, NULL, 0);
+}
+
+/// Both beacons are known and out of view.
+static void know_two(void)
+{
+    know_places();
     doubt_heading();
 }
 
@@ -170,6 +180,147 @@ static void test_what_is_clear_or_was_just_in_view_begins_none(void **state)
     assert_true(slam.records[0].match.lead < 6);
     assert_int_equal(bslam_slam_doubts(&slam), 0);
 }
+
+// ---- how many hypotheses ----------------------------------------------------------------------------------
+
+/// How many a robot follows that may follow so many: of the left one, the right one and a new one.
+static int follow(int32_t hypotheses, double doubt_nats)
+{
+    start(BSLAM_ASSOCIATION_POSITION, hypotheses);
+    know_two();
+    slam.settings.new_per_m2 = BSLAM_R(0.1);
+    slam.settings.doubt_nats = real(doubt_nats);
+    see(1, &NEARLY_LEFT_RAD, 1);
+    return bslam_slam_doubts(&slam) + 1;
+}
+
+/// In as much room as there is.
+static int at_most(int hypotheses)
+{
+    return hypotheses < BSLAM_HYPOTHESES_MAX ? hypotheses : BSLAM_HYPOTHESES_MAX;
+}
+
+static void test_each_choice_begins_a_hypothesis_while_there_is_room(void **state)
+{
+    for (int32_t hypotheses = 2; hypotheses <= 8; hypotheses++) {
+        assert_int_equal(follow(hypotheses, 100), at_most(hypotheses < 3 ? hypotheses : 3));
+        assert_near(heading_of(&slam.ekf), LEFT_RAD - NEARLY_LEFT_RAD, 0.01);
+        for (int k = 0; k < doubts.count; k++) {
+            const bslam_ekf_t *other = &doubts.others[k].ekf;
+            assert_near(heading_of(other), k == 0 ? RIGHT_RAD - NEARLY_LEFT_RAD : 0, 0.01);
+            assert_int_equal(other->beacon_count, k == 0 ? 2 : 3);
+        }
+    }
+}
+
+/// The right one is behind the left one by its lead, a new one by its score.
+static void test_a_choice_that_is_clearly_behind_begins_no_hypothesis(void **state)
+{
+    (void)follow(3, 100);
+    const double lead = (double)slam.records[0].match.lead, score = (double)slam.records[0].match.score;
+    assert_true(lead > 0.1 && score > 2 * lead);
+    assert_int_equal(follow(3, lead - 0.01), 1);
+    assert_int_equal(follow(3, lead + 0.01), 2);
+    assert_int_equal(follow(3, score - 0.01), 2);
+    assert_int_equal(follow(3, score + 0.01), at_most(3));
+}
+
+// ---- what waits -------------------------------------------------------------------------------------------
+
+/// What is seen beside a beacon may be a new one, or that one, seen badly.
+static int setup_places(void **state)
+{
+    setup(state);
+    know_places();
+    return 0;
+}
+
+static void assert_waits(int i)
+{
+    assert_int_equal(slam.accounts[i].outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(slam.accounts[i].reason, BSLAM_REASON_APPEARANCE);
+}
+
+/// What the two hypotheses have in their maps.
+static void assert_beacons(int in_force, int other)
+{
+    assert_int_equal(bslam_slam_doubts(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, in_force);
+    assert_int_equal(doubts.others[0].ekf.beacon_count, other);
+}
+
+static void test_a_new_beacon_in_doubt_waits_while_there_is_no_room(void **state)
+{
+    const double left = LEFT_RAD + BESIDE_RAD, right = RIGHT_RAD - BESIDE_RAD, clear = 1.5;
+    see(1, &left, 1);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+    assert_beacons(3, 2);
+    const double behind = (double)doubts.others[0].behind;
+    see(1, &right, 1);
+    assert_waits(0);
+    assert_beacons(3, 2);
+    assert_near(doubts.others[0].behind, behind, 0);  // and says nothing
+    see(1, &clear, 1);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+    assert_beacons(4, 3);
+    bslam_slam_end_doubt(&slam);
+    see(1, &right, 1);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+    assert_beacons(5, 4);
+}
+
+/// The one that is less sure begins a hypothesis.
+static void test_of_two_new_beacons_in_doubt_one_waits(void **state)
+{
+    const double beside[] = {RIGHT_RAD - BESIDE_RAD - 0.005, LEFT_RAD + BESIDE_RAD};
+    see(1, beside, 2);
+    assert_waits(0);
+    assert_int_equal(slam.accounts[1].outcome, BSLAM_OUTCOME_NEW);
+    assert_beacons(3, 2);
+}
+
+/// In the other hypothesis it is a known one, or the other way round.
+static void test_what_waits_says_nothing_between_two_hypotheses(void **state)
+{
+    const double beside[] = {DOUBTFUL_RAD + 0.14, DOUBTFUL_RAD - 0.14};
+    for (int i = 0; i < COUNT_OF(beside); i++) {
+        setup_doubt(NULL);
+        see(10, NULL, 0);
+        const double behind = (double)doubts.others[0].behind;
+        see(1, &beside[i], 1);
+        if (i == 0) {
+            assert_waits(0);
+        } else {
+            assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
+        }
+        assert_beacons(2, 2);
+        assert_int_equal(doubts.others[0].ekf.beacons[0].sightings, i == 0 ? 11 : 10);
+        assert_int_equal(doubts.others[0].ekf.beacons[1].sightings, 11);
+        assert_near(doubts.others[0].behind, behind, 0);
+    }
+}
+
+/// It is there to find out whether there is a new one.
+static void test_the_hypothesis_of_a_new_beacon_begins_it(void **state)
+{
+    const double between = 0.01;
+    slam.settings.new_per_m2 = BSLAM_R(1e-3);
+    see(1, &between, 1);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
+    assert_beacons(2, 3);
+}
+
+static void test_where_there_is_but_one_hypothesis_nothing_waits(void **state)
+{
+    const double left = LEFT_RAD + BESIDE_RAD;
+    start(BSLAM_ASSOCIATION_POSITION, 1);
+    know_places();
+    see(1, &left, 1);
+    assert_true(slam.records[0].match.lead < slam.settings.doubt_nats);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+}
+
+// ---- what comes next --------------------------------------------------------------------------------------
 
 static void test_all_hypotheses_go_through_a_motion(void **state)
 {
@@ -277,6 +428,83 @@ static void test_looks_go_with_the_hypothesis_that_is_put_in_force(void **state)
     assert_false(appearance.learner.classifiers[1].used);
 }
 
+/// Frames of a view, of which each says something else, and the last ones much more; and two views of it.
+enum { VIEW = 8, COUNTED = 5, FRAMES = 2 * VIEW };
+static const float FIRSTS[VIEW] = {-0.4f, -0.3f, -0.6f, -0.4f, -0.5f, 0.1f, 0.1f, 0.1f};
+
+/// By how much the other hypothesis is behind after each frame; only the left one's appearance is known, and
+/// perhaps told. said: what it says.
+static void view_twice(bool is_told, double behind[FRAMES], double said[FRAMES])
+{
+    float features[BSLAM_SAMPLE_FEATURES] = {0};
+    start(BSLAM_ASSOCIATION_SVM, 2);
+    assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
+    bslam_slam_attach_appearance(&slam, &appearance);
+    know_two();
+    unit_give_machine(&appearance, 0, 1, 3);
+    signature = is_told ? features : NULL;
+    for (int n = 0; n < FRAMES; n++) {
+        see(n == VIEW ? 30 : 0, NULL, 0);
+        features[0] = FIRSTS[n % VIEW];
+        slam.bearing_noise = slam.range_noise = (bslam_autocorrelation_t){0, 0};  // all that is said counts
+        see(1, &DOUBTFUL_RAD, 1);
+        assert_int_equal(bslam_slam_doubts(&slam), 1);
+        behind[n] = (double)doubts.others[0].behind;
+        said[n] = (double)slam.records[0].match.looks;
+    }
+    signature = NULL;
+}
+
+static void test_appearance_counts_by_the_mean_of_a_views_first_frames(void **state)
+{
+    double without[FRAMES], with[FRAMES], said[FRAMES], before = 0, sum = 0;
+    view_twice(false, without, said);
+    view_twice(true, with, said);
+    for (int n = 0; n < FRAMES; n++) {
+        const int k = n % VIEW, counted = k < COUNTED ? k + 1 : COUNTED;
+        before += n == VIEW ? sum / COUNTED : 0;
+        sum = (k == 0 ? 0 : sum) + (k < COUNTED ? said[n] : 0);
+        assert_near(with[n] - without[n], before + sum / counted, 1e-4);
+    }
+    assert_true(said[COUNTED] > 1.5 * sum / COUNTED);
+}
+
+/// A slip is paid for in the first frame of a view: those after it show the same one. The last view is of
+/// none.
+static void test_a_slip_is_paid_for_once_in_a_view(void **state)
+{
+    enum { SEEN = 3, VIEWS = 3 };
+    const double slip_nats = 5;
+    const float alike[BSLAM_SAMPLE_FEATURES] = {1};
+    start(BSLAM_ASSOCIATION_SVM, 2);
+    assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
+    bslam_slam_attach_appearance(&slam, &appearance);
+    know_two();
+    unit_give_machine(&appearance, 0, 1, 16);
+    unit_give_machine(&appearance, 1, -2, 16);
+    see(1, &DOUBTFUL_RAD, 1);
+    for (int n = 0; n < VIEWS * SEEN; n++) {
+        const bool is_first = n % SEEN == 0, slips = n < (VIEWS - 1) * SEEN;
+        signature = NULL;
+        see(is_first ? 30 : 0, NULL, 0);
+        signature = alike;
+        assert_int_equal(bslam_slam_doubts(&slam), 1);
+        doubts.others[0].behind = 0;
+        slam.bearing_noise = slam.range_noise = (bslam_autocorrelation_t){0, 0};  // all that is said counts
+        const double bearing_rad = LEFT_RAD - heading_of(&slam.ekf) + (slips ? 0.4 : 0);
+        see(1, &bearing_rad, 1);
+        const bslam_match_t *match = &slam.records[0].match;
+        assert_int_equal(match->beacon, 0);
+        assert_true(match->slipped == slips);
+        assert_true(match->looks > 5);
+        const double others = (double)doubts.others[0].cost[0];
+        const double paid = others - (double)doubts.others[0].behind + (double)match->log_density;
+        assert_true(fabs(others) < 100);  // it compares
+        assert_near(paid, is_first ? (slips ? slip_nats : 0) - (double)match->looks : 0, 1e-4);
+    }
+    signature = NULL;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -284,6 +512,13 @@ int main(void)
         cmocka_unit_test_setup(test_one_hypothesis_and_nothing_in_doubt_are_as_without, setup),
         cmocka_unit_test_setup(test_a_doubtful_sighting_begins_another_hypothesis, setup_doubt),
         cmocka_unit_test_setup(test_what_is_clear_or_was_just_in_view_begins_none, setup),
+        cmocka_unit_test_setup(test_each_choice_begins_a_hypothesis_while_there_is_room, setup),
+        cmocka_unit_test_setup(test_a_choice_that_is_clearly_behind_begins_no_hypothesis, setup),
+        cmocka_unit_test_setup(test_a_new_beacon_in_doubt_waits_while_there_is_no_room, setup_places),
+        cmocka_unit_test_setup(test_of_two_new_beacons_in_doubt_one_waits, setup_places),
+        cmocka_unit_test_setup(test_what_waits_says_nothing_between_two_hypotheses, setup),
+        cmocka_unit_test_setup(test_the_hypothesis_of_a_new_beacon_begins_it, setup_places),
+        cmocka_unit_test_setup(test_where_there_is_but_one_hypothesis_nothing_waits, setup),
         cmocka_unit_test_setup(test_all_hypotheses_go_through_a_motion, setup_doubt),
         cmocka_unit_test_setup(test_a_hypothesis_that_explains_much_less_is_forgotten, setup_doubt),
         cmocka_unit_test_setup(test_a_hypothesis_that_explains_more_is_put_in_force, setup_doubt),
@@ -291,6 +526,8 @@ int main(void)
         cmocka_unit_test_setup(test_what_changes_pose_or_map_ends_the_doubt, setup_doubt),
         cmocka_unit_test_setup(test_a_gap_of_odometry_is_one_for_all_hypotheses, setup_doubt),
         cmocka_unit_test_setup(test_looks_go_with_the_hypothesis_that_is_put_in_force, setup),
+        cmocka_unit_test_setup(test_appearance_counts_by_the_mean_of_a_views_first_frames, setup),
+        cmocka_unit_test_setup(test_a_slip_is_paid_for_once_in_a_view, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

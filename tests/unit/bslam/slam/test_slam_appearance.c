@@ -1,4 +1,5 @@
 // The pipeline with appearance attached: what it refuses, learns and takes out.
+#include "known_map.h"
 #include "support.h"
 
 #include <math.h>
@@ -186,11 +187,22 @@ static void test_a_beacon_removed_while_its_classifier_trains_is_forgotten(void 
     assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_E_NO_BEACON);
 }
 
+/// An object with a distance of 4 m, and object 1 where it is: the wheels have not slipped.
+static void see_beside_1(int object, int view, double bearing_rad)
+{
+    float a[BSLAM_SAMPLE_FEATURES];
+    float b[BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen[] = {unit_polar(bearing_rad, 4, -1), unit_polar(1, 4, -1)};
+    seen[0].signature = signature_of(object, view, a);
+    seen[1].signature = signature_of(1, OFTEN + view, b);
+    see(seen, 2);
+}
+
 /// Object 2 where beacon 0 is, as well as its distance tells, until so many are retired.
 static void see_another_in_its_place(uint32_t retired)
 {
     for (int view = 0; slam.counters.retired < retired && view < 200; view++) {
-        see_object(2, view, 0.1);
+        see_beside_1(2, view, 0.1);
     }
     assert_int_equal(slam.counters.retired, retired);
 }
@@ -233,7 +245,7 @@ static void test_what_is_seen_between_is_not_gone(void **state)
     drive_on(BSLAM_VIEW_US);
     for (int view = 0; slam.counters.retired < 4 && view < 400; view++) {
         const bool is_first = view % 10 == 9;
-        see_object(is_first ? 0 : 2, view, is_first ? 0 : 0.1);
+        see_beside_1(is_first ? 0 : 2, view, is_first ? 0 : 0.1);
     }
     assert_int_equal(slam.counters.retired, 4);
     assert_true(is_in_map(first_uid));
@@ -320,7 +332,6 @@ static void test_what_is_missed_is_noticed_while_another_is_tentative(void **sta
 {
     bslam_settings_t settings = svm_params();
     settings.missed_views = 3;
-    settings.existence_beacons = 0;
     settings.existence_sum = 1000;
     start(settings);
     pass_by(0, 0.1, true, 1.0);
@@ -359,10 +370,78 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
     assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
 }
 
+/// It is taken for the beacon that it resembles, as if the wheels had slipped; the filter knows of no slip.
+static void test_what_a_slip_would_explain_is_neither_used_nor_new(void **state)
+{
+    bslam_settings_t settings = svm_params();
+    settings.gate_d2 = 9;
+    start(settings);
+    see_two(40);
+    see_object(0, 50, 0.4);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_REJECTED);
+    assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
+    assert_int_equal(slam.accounts[0].beacon_uid, slam.ekf.beacons[0].uid);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+}
+
+/// The mean of what the first five frames of a view say; what was out of view is looked at anew.
+static void test_appearance_of_a_view_is_the_mean_of_its_first_frames(void **state)
+{
+    enum { COUNTED = 5 };
+    slam.settings.learn_budget = 0;
+    see_two(10);
+    unit_give_machine(&appearance, 0, 1, 3);
+    for (int view = 0; view < 2; view++) {
+        double sum = 0;
+        drive_on(BSLAM_VIEW_US);
+        for (int k = 0; k < 8; k++) {
+            const float features[BSLAM_SAMPLE_FEATURES] = {k < COUNTED ? 0.1f * (float)(k % 3 - view) : 0.9f};
+            bslam_sighting_t seen = unit_polar(0, 4, -1);
+            seen.signature = features;
+            see(&seen, 1);
+            const int counted = k < COUNTED ? k + 1 : COUNTED;
+            sum += k < COUNTED ? (double)slam.records[0].match.looks : 0;
+            assert_near(appearance.of[0].view_looks, sum / counted, 1e-5);
+            assert_int_equal(appearance.of[0].view_frames, counted);
+        }
+        assert_true((double)slam.records[0].match.looks > sum / COUNTED + 1);
+    }
+}
+
+/// What does not pass the gate is looked at as well, in its place or after a slip.
+static void test_a_view_counts_frames_that_are_not_used(void **state)
+{
+    static const double off_rad[] = {0, 0.085, 0.4, 0.4, 0, 0.4};
+    bslam_settings_t settings = svm_params();
+    settings.gate_d2 = 9;
+    settings.learn_budget = 0;
+    start(settings);
+    see_two(40);
+    unit_give_machine(&appearance, 0, 1, 3);
+    drive_on(BSLAM_VIEW_US);
+    double sum = 0;
+    for (int k = 0; k < COUNT_OF(off_rad); k++) {
+        const float features[BSLAM_SAMPLE_FEATURES] = {0.8f - 0.1f * (float)(k % 3)};
+        const int counted = k < 5 ? k + 1 : 5;
+        bslam_sighting_t seen = unit_polar(off_rad[k], 4, -1);
+        seen.signature = features;
+        see(&seen, 1);
+        assert_int_equal(slam.accounts[0].reason, off_rad[k] > 0 ? BSLAM_REASON_GATE : BSLAM_REASON_NONE);
+        assert_int_equal(slam.records[0].match.beacon, 0);
+        assert_true(slam.records[0].match.slipped == (off_rad[k] > 0.1));
+        sum += k < 5 ? (double)slam.records[0].match.looks : 0;
+        assert_int_equal(appearance.of[0].view_frames, counted);
+        assert_near(appearance.of[0].view_looks, sum / counted, 1e-5);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
+        cmocka_unit_test_setup(test_what_a_slip_would_explain_is_neither_used_nor_new, setup),
+        cmocka_unit_test_setup(test_appearance_of_a_view_is_the_mean_of_its_first_frames, setup),
+        cmocka_unit_test_setup(test_a_view_counts_frames_that_are_not_used, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),

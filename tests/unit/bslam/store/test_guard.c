@@ -25,7 +25,7 @@ static void flip(bslam_slam_t *of, size_t byte, size_t bit)
 /// What a step makes of a state.
 static uint64_t step(bslam_slam_t *of)
 {
-    const int64_t time_us = 13 * 40000;
+    const int64_t time_us = (KEPT_VIEWS + 1) * KEPT_STEP_US;
     const bslam_odometry_reading_t reading = {
         .source = BSLAM_ODOMETRY_WHEELS, .time_us = time_us, .left_m = real(0.01), .right_m = real(0.02)};
     const bslam_sighting_t seen[] = {unit_polar(-1.5, 2.0, -1), unit_direction(2.4, -1)};
