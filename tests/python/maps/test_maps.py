@@ -16,6 +16,7 @@ from bslam.maps.blob import KeptBeacon, KeptMap, pack, parse
 from bslam.maps.merge import merge
 from bslam.maps.text import from_json, to_json
 
+STEP_US = 120_000  # ten of them last for the second that a beacon needs
 PLACES = np.array([[4.0, 1.0], [3.0, -2.0], [-1.0, 4.0], [6.0, 3.0], [-2.0, -3.0]])
 
 
@@ -32,9 +33,9 @@ def seen_map(places, labels, looks_of=None, **params):
             noise = 0.02 * random.standard_normal((len(places), 71))
             signature = np.clip(looks_of[labels] + noise, 0, 1).astype(np.float32)
         names = labels if looks_of is None else [-1] * len(places)
-        slam.odometry("wheels", 40_000 * step, 0.0, 0.0)
+        slam.odometry("wheels", STEP_US * step, 0.0, 0.0)
         columns = (bearing.tolist(), far.tolist(), list(names), [True] * len(places))
-        slam.sightings(40_000 * step, *columns, signature=signature)
+        slam.sightings(STEP_US * step, *columns, signature=signature)
     return slam.save_map()
 
 
