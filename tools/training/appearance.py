@@ -3,7 +3,8 @@
 Drives apart from all tests are shown to the learner as a robot would: a sample of each beacon every 10 cm.
 When a beacon comes into view, each classifier says how near the sighting is to what it keeps and how it
 decides. A logistic function of these, and of the logarithm of how many samples there are, says how likely it
-is that beacon: both answers, and all counts of samples, weigh alike.
+is that beacon. Both answers, and all counts of samples, weigh alike. So do, of the others, those that some
+classifier knows and those that come into view for the first time, which no classifier was taught to refuse.
 
     python -m tools.training.appearance                       # 20 min on two cores
     python -m tools.training.appearance --camera 70000:70000  # simulated looks alone
@@ -39,7 +40,8 @@ CLASSIFIERS = 80
 SAMPLE_EVERY_M, VIEW_US, VIEW_FRAMES = 0.1, 1_000_000, (1, 3, 5)
 COUNTS = ((1, 1), (2, 3), (4, 8), (9, 16))  # of samples, which weigh alike
 ODDS_MAX = 8.0
-Row = tuple[float, float, float, float, float]
+SHARES = (0.5, 0.25, 0.25)  # of the answers: that beacon, another that is known, a new one
+Row = tuple[float, float, float, float, float, float]
 METHODS = {  # by name: whether it looks at kept samples, at their middle, at the decision value
     "SVM": (False, False, True),
     "NEAREST": (True, False, False),
@@ -100,7 +102,7 @@ def learner(folder: Path) -> ctypes.CDLL:
 
 
 def views(log: Log) -> list[Row]:
-    """Rows (samples, nearest, middle, value, is that beacon) of a drive."""
+    """Rows (samples, nearest, middle, value, is that beacon, is a known one) of a drive."""
     assert log.truth is not None and log.seeds is not None and log.sightings.signature is not None
     with tempfile.TemporaryDirectory() as folder:
         library = learner(Path(folder))
@@ -121,7 +123,8 @@ def views(log: Log) -> list[Row]:
         for other, classifier in classifiers.items() if frame in VIEW_FRAMES else ():
             count = library.ask(classifier, _pointer(samples[i]), _pointer(answer))
             nearest, middle = np.sqrt(answer[:2]) / 127.0
-            row = (count, float(nearest), float(middle), float(answer[2]), float(other == beacon))
+            is_it, is_known = other == beacon, beacon in classifiers
+            row = (count, float(nearest), float(middle), float(answer[2]), float(is_it), float(is_known))
             rows += [row] if count > 0 else []
         if beacon not in classifiers:
             classifiers[beacon] = library.add()
@@ -146,13 +149,15 @@ def _rendered(seed: int) -> list[Row]:
 
 @dataclass(frozen=True)
 class Views:
-    """Of many drives: samples, distances and decision values (n,); which beacon it was; by which drive."""
+    """Of many drives: samples, distances and decision values (n,); whether it was that beacon, and whether a
+    known one; by which drive."""
 
     samples: NDArray[np.float64]
     nearest: NDArray[np.float64]
     middle: NDArray[np.float64]
     value: NDArray[np.float64]
     is_it: NDArray[np.bool_]
+    is_known: NDArray[np.bool_]
     drive: NDArray[np.int64]
 
     def columns(self, method: str) -> NDArray[np.float64]:
@@ -163,6 +168,10 @@ class Views:
         more = np.log(self.samples)
         one = np.ones_like(more)
         return np.stack([one, distance, decided, more, more * distance, more * decided], axis=1)
+
+    def answers(self) -> tuple[NDArray[np.bool_], ...]:
+        """Rows of that beacon; of another that is known; of a new one."""
+        return self.is_it, ~self.is_it & self.is_known, ~self.is_known
 
     def bins(self) -> Iterator[NDArray[np.bool_]]:
         """Rows of each range of COUNTS."""
@@ -177,8 +186,8 @@ def collect(seeds: range, one: Callable[[int], list[Row]], jobs: int) -> Views |
         drives = list(pool.map(one, seeds))
     rows = np.array([row for drive in drives for row in drive])
     numbers = np.concatenate([np.full(len(drive), i) for i, drive in enumerate(drives)])
-    samples, nearest, middle, value, is_it = rows.T
-    return Views(samples, nearest, middle, value, is_it > 0.5, numbers)
+    samples, nearest, middle, value, is_it, is_known = rows.T
+    return Views(samples, nearest, middle, value, is_it > 0.5, is_known > 0.5, numbers)
 
 
 def fit(views_of: list[Views], method: str, kept: list[NDArray[np.bool_]]) -> NDArray[np.float64]:
@@ -189,9 +198,9 @@ def fit(views_of: list[Views], method: str, kept: list[NDArray[np.bool_]]) -> ND
     for one, use in zip(views_of, kept, strict=True):
         weight = np.zeros(len(one.is_it))
         for rows in one.bins():
-            for answer in (True, False):
-                chosen = rows & (one.is_it == answer) & use
-                weight[chosen] = 1e4 / max(1, chosen.sum())
+            for answer, share in zip(one.answers(), SHARES, strict=True):
+                chosen = rows & answer & use
+                weight[chosen] = 1e4 * share / max(1, chosen.sum())
         weights.append(weight[use])
     moves = columns.std(axis=0) > 0
     model = LogisticRegression(C=1e6, max_iter=10_000)
@@ -209,7 +218,10 @@ def log_loss(
     odds = np.clip(views.columns(method) @ coefficients, -ODDS_MAX, ODDS_MAX)
     loss = np.log1p(np.exp(np.where(views.is_it, -odds, odds)))
     return [
-        float(np.mean([loss[rows & use & (views.is_it == answer)].mean() for answer in (True, False)]))
+        sum(
+            share * float(loss[rows & use & answer].mean())
+            for answer, share in zip(views.answers(), SHARES, strict=True)
+        )
         for rows in views.bins()
     ]
 

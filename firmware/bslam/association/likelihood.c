@@ -102,7 +102,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     }
     found->distance2 = weight.distance2;
     found->slipped = false;
-    if (may_slip && weight.distance2 > frame->settings->candidate_d2) {
+    if (may_slip && other->confirmed && weight.distance2 > frame->settings->candidate_d2) {
         doubt_place(&taken, frame->settings, &innovation);
         found->slipped = bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) == BSLAM_OK;
     }

@@ -243,6 +243,9 @@ static void fill_rows(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, cons
 /// Three degrees: below that an arc differs from its tangent by less than the noise of any distance.
 static const bslam_real_t BENT_HEADING_VAR_RAD2 = BSLAM_R(0.0027);
 
+/// Ten degrees: so far the model is straight. A step leaves a fifth of the way, of the variance, too.
+static const bslam_real_t STRAIGHT_VAR_RAD2 = BSLAM_R(0.03), STEP_SHARE = BSLAM_R(0.25);
+
 static bslam_real_t squared(bslam_real_t x)
 {
     return x * x;
@@ -348,6 +351,17 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
                    bslam_ekf_distance2(ekf, &innovation, &distance2) == BSLAM_OK
                ? distance2
                : -1;
+}
+
+bool bslam_ekf_soften(const bslam_ekf_t *ekf, bslam_innovation_t *innovation)
+{
+    const forms_t p = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
+    if (p.bb <= STRAIGHT_VAR_RAD2) {
+        return false;
+    }
+    innovation->range_var_m2 += STEP_SHARE * p.aa;
+    innovation->bearing_var_rad2 += STEP_SHARE * p.bb;
+    return true;
 }
 
 /// The sum over a row of L, in the columns from `from` up to `to`, times h.

@@ -74,6 +74,20 @@ static void forget(bslam_slam_t *slam, int k)
     }
 }
 
+void bslam_slam_forget_worst(bslam_slam_t *slam, bslam_real_t behind)
+{
+    int worst = -1;
+    for (int k = 0; k < slam->doubts->count; k++) {
+        if (slam->doubts->others[k].behind > behind) {
+            behind = slam->doubts->others[k].behind;
+            worst = k;
+        }
+    }
+    if (worst >= 0) {
+        forget(slam, worst);
+    }
+}
+
 void bslam_slam_end_doubt(bslam_slam_t *slam)
 {
     if (bslam_slam_can_doubt(slam)) {

@@ -33,6 +33,9 @@ typedef struct bslam_doubts {
 /// the pose is changed from outside.
 void bslam_slam_end_doubt(bslam_slam_t *slam);
 
+/// The one that is the farthest behind, of those that are farther than so much, is forgotten.
+void bslam_slam_forget_worst(bslam_slam_t *slam, bslam_real_t behind);
+
 /// The hypothesis in force once more; and another one in force, with that in its place. Uids are given once,
 /// whoever gives them.
 void bslam_hypothesis_copy(const bslam_slam_t *slam, bslam_hypothesis_t *hypothesis);

@@ -10,6 +10,9 @@
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 // Of a view so many frames speak of appearance: they err together.
 enum { VIEW_FRAMES = 5 };
+// A heading is far in doubt beyond ten degrees; after so many steps it is not.
+static const bslam_real_t TURNED_VAR_RAD2 = BSLAM_R(0.03);
+enum { STEPS_MAX = 4 };
 
 // ---- from where a frame was taken -------------------------------------------------------------------------
 
@@ -80,6 +83,7 @@ static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
                        bslam_beacon_t *beacon, bslam_real_t distance2)
 {
     beacon->sightings++;
+    bslam_slam_confirm_again(slam, beacon, time_us);
     beacon->last_seen_us = time_us;
     bslam_slam_confirm_match(slam, beacon, sighting, distance2);
 }
@@ -261,16 +265,23 @@ static void choose_distances(bslam_slam_t *slam, const bslam_pose_t *mount, int 
     }
 }
 
+/// What a match shows, from where the frame was taken.
+static bslam_status_t innovation_of(const bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                                    const bslam_record_t *record, bslam_innovation_t *innovation)
+{
+    const int index = record->match.beacon;
+    bslam_sighting_t taken = bslam_ekf_taken_as(&slam->ekf.beacons[index], record->sighting);
+    doubt(slam, vantage, &taken);
+    return bslam_ekf_innovation(&slam->ekf, &slam->settings, &vantage->mount, &taken, index, innovation);
+}
+
 static void take_innovation(bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam_real_t gate_d2,
                             bslam_record_t *record)
 {
     bslam_match_t *match = &record->match;
     bslam_innovation_t *innovation = &record->innovation;
     const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
-    bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
-    doubt(slam, vantage, &taken);
-    if (bslam_ekf_innovation(&slam->ekf, &slam->settings, &vantage->mount, &taken, match->beacon,
-                             innovation) != BSLAM_OK) {
+    if (innovation_of(slam, vantage, record, innovation) != BSLAM_OK) {
         reject(slam, BSLAM_REASON_SINGULAR, beacon, record->account);
         match->verdict = BSLAM_VERDICT_REJECT;
     }
@@ -335,10 +346,45 @@ static void augment(bslam_slam_t *slam, const bslam_vantage_t *vantage, int coun
     }
 }
 
+/// A step towards a heading that is far in doubt: matches at a part of their worth. False: none goes anywhere.
+static bool take_step(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
+{
+    const bslam_real_t gate_d2 = gate_of(slam, vantage->moment_us);
+    bool moves = false;
+    for (int i = 0; i < count; i++) {
+        bslam_record_t *record = &slam->records[i];
+        bslam_innovation_t *innovation = &record->innovation;
+        innovation->has_range = record->match.verdict == BSLAM_VERDICT_MATCH &&
+                                innovation_of(slam, vantage, record, innovation) == BSLAM_OK &&
+                                innovation->has_range && bslam_ekf_soften(&slam->ekf, innovation);
+        innovation->gate_d2 = gate_d2;
+    }
+    for (int i = 0; i < count; i++) {
+        const bslam_innovation_t *innovation = &slam->records[i].innovation;
+        bslam_fusion_t fusion;
+        if (innovation->has_range) {
+            moves = bslam_ekf_fuse(&slam->ekf, &slam->settings, innovation, &fusion) == BSLAM_OK || moves;
+        }
+    }
+    bslam_ekf_correct(&slam->ekf, &slam->settings);
+    return moves;
+}
+
+/// Each step looks at the matches from where the last one led. MATH "Which beacon is it".
+static void approach(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
+{
+    bool moves = slam->settings.filter != BSLAM_FILTER_STANDARD &&
+                 bslam_ekf_covariance(&slam->ekf, BSLAM_STATE_THETA, BSLAM_STATE_THETA) > TURNED_VAR_RAD2;
+    for (int step = 0; step < STEPS_MAX && moves; step++) {
+        moves = take_step(slam, vantage, count);
+    }
+}
+
 /// Not to be inlined: association, before it, goes deepest, and would have its frame on the stack.
 __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, const bslam_vantage_t *vantage,
                                                   int count)
 {
+    approach(slam, vantage, count);
     measure(slam, vantage, count);
     bslam_slam_doubt_sightings(slam, count);
     fuse(slam, vantage, count);

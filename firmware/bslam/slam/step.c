@@ -131,21 +131,26 @@ static int doubtful(const bslam_slam_t *slam, int64_t time_us, int count)
     return least;
 }
 
-static bool has_room(const bslam_slam_t *slam)
+/// Whether there is room for another one. One that is farther behind than it would be makes room.
+static bool has_room(bslam_slam_t *slam, bslam_real_t behind)
 {
     const int most =
         slam->settings.hypotheses < BSLAM_HYPOTHESES_MAX ? slam->settings.hypotheses : BSLAM_HYPOTHESES_MAX;
+    if (slam->doubts->count + 1 >= most) {
+        bslam_slam_forget_worst(slam, behind);
+    }
     return slam->doubts->count + 1 < most;
 }
 
-/// Begins a hypothesis for every other choice of a sighting that is near enough to the one in force.
-static void branch(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sightings,
+/// Begins a hypothesis for every other choice of a sighting that is near enough to the one in force. False:
+/// there is room for none.
+static bool branch(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sightings,
                    int count, int i)
 {
     bslam_bar_t bar = {.sighting = i};
     const bslam_match_t *match = &slam->records[i].match;
     bslam_real_t gap = match->lead;
-    while (gap < slam->settings.doubt_nats && has_room(slam) &&
+    while (gap < slam->settings.doubt_nats && has_room(slam, gap) &&
            (is_made(match) || match->verdict == BSLAM_VERDICT_TENTATIVE)) {
         bslam_hypothesis_t *other = &slam->doubts->others[slam->doubts->count];
         bar.choices[bar.count++] = match->beacon;
@@ -157,6 +162,7 @@ static void branch(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bsl
         take_turn(slam, other, &bar, vantage, sightings, count);
         gap += match->lead;
     }
+    return bar.count > 0;
 }
 
 /// bslam_slam_associate for the hypothesis in force, once the others have taken the frame. A doubtful choice
@@ -175,12 +181,12 @@ static void follow_doubts(bslam_slam_t *slam, const bslam_vantage_t *vantage,
         take_turn(slam, &doubts->others[k], NULL, vantage, sightings, count);
     }
     bslam_slam_associate(slam, vantage, sightings, count, NULL);
-    const int i = has_room(slam) ? doubtful(slam, time_us, count) : -1;
-    if (i >= 0) {
-        branch(slam, vantage, sightings, count, i);
+    const int i = doubtful(slam, time_us, count);
+    const bool begins = i >= 0 && branch(slam, vantage, sightings, count, i);
+    if (begins) {
         bslam_slam_associate(slam, vantage, sightings, count, NULL);
     }
-    wait_with_new(slam, count, i);
+    wait_with_new(slam, count, begins ? i : -1);
     bslam_real_t cost[BSLAM_SIGHTINGS_MAX];
     note_costs(slam, count, cost);
     for (int k = 0; k < doubts->count; k++) {

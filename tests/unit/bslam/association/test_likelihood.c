@@ -297,10 +297,11 @@ static void test_sure_enough_to_learn_from(void **state)
 
 // ---- a slip of the wheels ---------------------------------------------------------------------------------
 
-/// A beacon 4 m ahead, to whose appearance ALIKE is alike.
+/// A confirmed beacon 4 m ahead, to whose appearance ALIKE is alike.
 static int setup_alike(void **state)
 {
     setup(state);
+    ekf.beacons[0].confirmed = true;
     unit_give_machine(&appearance, 0, 3, 16);
     return 0;
 }
@@ -391,6 +392,7 @@ static void test_where_a_beacon_holds_nothing_has_slipped(void **state)
 {
     static const double places[2][2] = {{4, 0}, {0, 4}};
     begin(places, 2);
+    ekf.beacons[0].confirmed = true;
     settings.new_per_m2 = BSLAM_R(1e-4);
     const double off_rad[] = {0, 0, 0.11};
     for (int i = 0; i < 2 * COUNT_OF(off_rad); i++) {
@@ -461,6 +463,7 @@ static void test_a_slip_is_weighed_given_the_matches_before(void **state)
 {
     static const double places[2][2] = {{4, 0}, {0, 4}};
     begin(places, 2);
+    ekf.beacons[0].confirmed = true;
     covariance_forget(&ekf, BSLAM_STATE_THETA, 0.0026);
     const double b = 0.0026, a = b + bearing_var_ahead(), first = 0.1, off = 0.5;
     const bslam_sighting_t seen[] = {seen_with(unit_polar(off, 4, -1), ALIKE),
@@ -482,6 +485,15 @@ static void test_what_is_barred_is_not_taken_after_a_slip(void **state)
     const bslam_bar_t bar = {0, 1, {0}};
     frame.bar = &bar;
     assert_goes_to(far_off(ALIKE), BSLAM_CHOICE_NEW);
+}
+
+/// What may be no beacon says nothing of the wheels.
+static void test_only_what_is_confirmed_tells_of_a_slip(void **state)
+{
+    assert_goes_to(far_off(ALIKE), 0);
+    ekf.beacons[0].confirmed = false;
+    assert_goes_to(far_off(ALIKE), BSLAM_CHOICE_NEW);
+    assert_goes_to(seen_with(unit_polar(0, 4, -1), ALIKE), 0);
 }
 
 /// However rare new ones are: by position alone anything in view might be meant.
@@ -678,6 +690,7 @@ int main(void)
         cmocka_unit_test_setup(test_after_a_slip_all_may_be_elsewhere, setup_alike),
         cmocka_unit_test_setup(test_a_slip_is_weighed_given_the_matches_before, setup_alike),
         cmocka_unit_test_setup(test_what_is_barred_is_not_taken_after_a_slip, setup_alike),
+        cmocka_unit_test_setup(test_only_what_is_confirmed_tells_of_a_slip, setup_alike),
         cmocka_unit_test_setup(test_without_an_appearance_nothing_has_slipped, setup_alike),
         cmocka_unit_test_setup(test_by_position_looks_say_nothing, setup_position),
         cmocka_unit_test_setup(test_by_position_another_class_is_another_beacon, setup_position),

@@ -870,6 +870,51 @@ static void test_fuse_in_a_doubt_shared_with_beacons_close_by_leaves_correlation
     }
 }
 
+// ---- a step of the way ------------------------------------------------------------------------------------
+
+/// The covariance becomes so much of itself that a beacon's predicted direction has this variance. Returns
+/// H P Hᵀ.
+static dense_t doubt_direction(bslam_ekf_t *ekf, int beacon, double variance_rad2)
+{
+    const dense_t rows = twin_rows(ekf, &mount, beacon);
+    dense_t covariance = covariance_of(ekf);
+    const double share = variance_rad2 / dense_sandwich(&rows, &covariance).at[1][1];
+    for (int i = 0; i < covariance.rows; i++) {
+        for (int j = 0; j < covariance.columns; j++) {
+            covariance.at[i][j] *= share;
+        }
+    }
+    covariance_set(ekf, &covariance);
+    return dense_sandwich(&rows, &covariance);
+}
+
+static void test_soften_adds_a_quarter_of_the_prediction_where_its_direction_is_far_in_doubt(void **state)
+{
+    static const double variances_rad2[] = {0.001, 0.0299, 0.0301, 0.5};
+    bslam_settings_t settings = params_of(1, true);
+    settings.sensor_doubt = 1;
+    unit_random_t random = {24};
+    for (int i = 0; i < 10 * COUNT_OF(variances_rad2); i++) {
+        const double variance_rad2 = variances_rad2[i % COUNT_OF(variances_rad2)];
+        bslam_ekf_t ekf = random_filter(&settings, &random);
+        const plan_t plan = random_plan(&random, i % 5, true);
+        const dense_t hph = doubt_direction(&ekf, plan.beacon, variance_rad2);
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        bslam_innovation_t innovation = innovation_of(&ekf, &settings, plan.beacon, &sighting), before;
+        memcpy(&before, &innovation, sizeof before);
+        assert_int_equal(bslam_ekf_soften(&ekf, &innovation), variance_rad2 > 0.03);
+        if (variance_rad2 > 0.03) {
+            const double range_m2 = hph.at[0][0] / 4, bearing_rad2 = hph.at[1][1] / 4;
+            assert_near(innovation.range_var_m2 - before.range_var_m2, range_m2, TOLERANCE * range_m2);
+            assert_near(innovation.bearing_var_rad2 - before.bearing_var_rad2, bearing_rad2,
+                        TOLERANCE * bearing_rad2);
+            innovation.range_var_m2 = before.range_var_m2;
+            innovation.bearing_var_rad2 = before.bearing_var_rad2;
+        }
+        assert_memory_equal(&innovation, &before, sizeof before);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -903,6 +948,8 @@ int main(void)
         cmocka_unit_test(test_innovation_of_a_beacon_at_the_sensor_is_singular),
         cmocka_unit_test(test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular),
         cmocka_unit_test(test_fuse_and_distance2_of_an_indefinite_state_are_singular),
+
+        cmocka_unit_test(test_soften_adds_a_quarter_of_the_prediction_where_its_direction_is_far_in_doubt),
 
         cmocka_unit_test(test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible),
         cmocka_unit_test(test_fuse_in_a_doubt_shared_with_beacons_close_by_leaves_correlations_possible),

@@ -274,6 +274,51 @@ static void test_by_likelihood_a_beacon_is_seen_for_a_second(void **state)
     assert_true(is_confirmed(0));
 }
 
+static void see_nothing_after(int64_t us)
+{
+    now_us += us;
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us, NULL, 0), BSLAM_OK);
+}
+
+/// Fails unless the beacon is there after so long without a sighting, and no longer a moment later.
+static void assert_leaves_after(int64_t us)
+{
+    see_nothing_after(us);
+    assert_int_equal(slam.ekf.beacon_count, 1);
+    see_nothing_after(1);
+    assert_int_equal(slam.ekf.beacon_count, 0);
+    assert_int_equal(slam.counters.removed, 1);
+}
+
+/// Seen too rarely it has a window from the first sighting on. Glimpsed, it stays; but it is no accident a while
+/// later that confirms it: that begins another window.
+static void test_by_likelihood_what_was_glimpsed_has_all_to_prove_anew(void **state)
+{
+    enum { WINDOW_US = LASTING_US };
+    start(BSLAM_ASSOCIATION_SVM);
+    slam.settings.confirm_window_us = WINDOW_US;
+    (void)see(0);
+    (void)see_after(1000, 0.2, 0);
+    assert_leaves_after(WINDOW_US - 1000);
+    for (int late = 0; late <= 1; late++) {
+        start(BSLAM_ASSOCIATION_SVM);
+        slam.settings.confirm_window_us = WINDOW_US;
+        for (int i = 0; i < 3; i++) {
+            (void)see_after(1000, 0.2, 0);
+        }
+        see_nothing_after(WINDOW_US / 2);
+        assert_int_equal(slam.ekf.beacon_count, 1);
+        (void)see_after(WINDOW_US - WINDOW_US / 2 + late, 0.2, 0);
+        assert_int_equal(is_confirmed(0), late == 0);
+        assert_int_equal(slam.ekf.beacons[0].views, late == 0 ? 3 : 1);
+        if (late == 1) {
+            assert_leaves_after(WINDOW_US);
+        }
+    }
+}
+
 /// The robot stands, and sees one thing in this direction without a distance.
 static void see_direction(double score)
 {
@@ -360,6 +405,7 @@ int main(void)
         cmocka_unit_test_setup(test_the_order_of_a_frame_does_not_matter, setup),
         cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),
         cmocka_unit_test_setup(test_by_likelihood_a_beacon_is_seen_for_a_second, setup),
+        cmocka_unit_test_setup(test_by_likelihood_what_was_glimpsed_has_all_to_prove_anew, setup),
         cmocka_unit_test_setup(test_without_the_distance_that_others_have_a_score_says_little_for_it, setup),
         cmocka_unit_test_setup(test_a_distance_later_in_the_frame_counts_as_much, setup),
         cmocka_unit_test_setup(test_a_new_start_knows_of_no_distances, setup),

@@ -255,9 +255,11 @@ static void test_a_new_beacon_in_doubt_waits_while_there_is_no_room(void **state
     see(1, &left, 1);
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
     assert_beacons(3, 2);
+    doubts.others[0].behind = BSLAM_R(0.1);  // less than what would begin now
     const double behind = (double)doubts.others[0].behind;
     see(1, &right, 1);
     assert_waits(0);
+    assert_true(slam.records[0].match.lead > BSLAM_R(0.1));
     assert_beacons(3, 2);
     assert_near(doubts.others[0].behind, behind, 0);  // and says nothing
     see(1, &clear, 1);
@@ -318,6 +320,74 @@ static void test_where_there_is_but_one_hypothesis_nothing_waits(void **state)
     see(1, &left, 1);
     assert_true(slam.records[0].match.lead < slam.settings.doubt_nats);
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+}
+
+// ---- who makes room ---------------------------------------------------------------------------------------
+
+static void test_of_those_farther_behind_the_farthest_is_forgotten(void **state)
+{
+    static const double behind[] = {1, 5, 3}, than[] = {0, 4, 5, 6};
+    for (int i = 0; i < COUNT_OF(than); i++) {
+        bool is_left[COUNT_OF(behind)] = {false};
+        start(BSLAM_ASSOCIATION_POSITION, 4);
+        doubts.count = COUNT_OF(behind);
+        for (int k = 0; k < COUNT_OF(behind); k++) {
+            doubts.others[k].behind = real(behind[k]);
+            doubts.others[k].since_us = k;
+        }
+        bslam_slam_forget_worst(&slam, real(than[i]));
+        assert_int_equal(doubts.count, than[i] < 5 ? 2 : 3);
+        for (int k = 0; k < doubts.count; k++) {
+            const int was = (int)doubts.others[k].since_us;
+            assert_near(doubts.others[k].behind, behind[was], 0);
+            is_left[was] = true;
+        }
+        assert_true(is_left[0] && is_left[2]);
+        assert_int_equal(is_left[1], than[i] >= 5);
+    }
+}
+
+/// There is another one, so much behind, and room for no more; then a sighting is in doubt. Whether another
+/// one is there after that; by how much the sighting's choice leads.
+static bool is_replaced(double behind, double *lead)
+{
+    const double beside = DOUBTFUL_RAD + 0.14;
+    setup_doubt(NULL);
+    const int64_t since_us = doubts.others[0].since_us;
+    see(10, NULL, 0);
+    assert_int_equal(doubts.others[0].since_us, since_us);
+    doubts.others[0].behind = real(behind);
+    see(1, &beside, 1);
+    assert_int_equal(bslam_slam_doubts(&slam), 1);
+    assert_true(doubts.others[0].since_us == since_us || doubts.others[0].since_us == slam.moment_us);
+    *lead = (double)slam.records[0].match.lead;
+    return doubts.others[0].since_us != since_us;
+}
+
+static void test_a_hypothesis_farther_behind_than_a_new_doubt_makes_room_for_it(void **state)
+{
+    double lead, same;
+    assert_true(is_replaced(8.9, &lead));
+    assert_true(lead > 0.1 && lead < 6);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_NEW);
+    assert_beacons(3, 2);
+    assert_true(is_replaced(lead + 0.01, &same));
+    assert_false(is_replaced(lead - 0.01, &same));
+    assert_waits(0);
+    assert_beacons(2, 2);
+}
+
+static void test_where_there_is_room_for_another_no_hypothesis_is_forgotten(void **state)
+{
+    const double beside = DOUBTFUL_RAD + 0.14;
+    const int64_t since_us = doubts.others[0].since_us;
+    see(10, NULL, 0);
+    slam.settings.hypotheses = 3;
+    doubts.others[0].behind = BSLAM_R(8.9);
+    see(1, &beside, 1);
+    assert_int_equal(bslam_slam_doubts(&slam), 2);
+    assert_int_equal(doubts.others[0].since_us, since_us);
+    assert_int_equal(doubts.others[1].since_us, slam.moment_us);
 }
 
 // ---- what comes next --------------------------------------------------------------------------------------
@@ -519,6 +589,9 @@ int main(void)
         cmocka_unit_test_setup(test_what_waits_says_nothing_between_two_hypotheses, setup),
         cmocka_unit_test_setup(test_the_hypothesis_of_a_new_beacon_begins_it, setup_places),
         cmocka_unit_test_setup(test_where_there_is_but_one_hypothesis_nothing_waits, setup),
+        cmocka_unit_test_setup(test_of_those_farther_behind_the_farthest_is_forgotten, setup),
+        cmocka_unit_test_setup(test_a_hypothesis_farther_behind_than_a_new_doubt_makes_room_for_it, setup),
+        cmocka_unit_test_setup(test_where_there_is_room_for_another_no_hypothesis_is_forgotten, setup_doubt),
         cmocka_unit_test_setup(test_all_hypotheses_go_through_a_motion, setup_doubt),
         cmocka_unit_test_setup(test_a_hypothesis_that_explains_much_less_is_forgotten, setup_doubt),
         cmocka_unit_test_setup(test_a_hypothesis_that_explains_more_is_put_in_force, setup_doubt),

@@ -1154,6 +1154,77 @@ static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map
     }
 }
 
+/// A robot that stands at the origin to 0.3 m and heads along x to so much, with one beacon in its map, known
+/// to a centimetre; distances are good to 5 cm.
+static bslam_slam_t turned(int32_t filter, double heading_sd_rad)
+{
+    bslam_settings_t settings = unit_settings();
+    settings.filter = filter;
+    settings.range_sd_floor_m = BSLAM_R(0.05);
+    settings.range_sd_fraction = settings.range_sd_per_m = 0;
+    bslam_slam_t slam = started(settings);
+    const bslam_pose_t origin = {0, 0, 0};
+    int index;
+    assert_int_equal(bslam_slam_set_pose(&slam, &origin, BSLAM_R(0.3), real(heading_sd_rad)), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add_guess(&slam.ekf, 4, 1, BSLAM_R(0.01), &index), BSLAM_OK);
+    slam.ekf.beacons[index].label = 7;
+    slam.ekf.beacons[index].confirmed = true;
+    return slam;
+}
+
+/// By the invariant filter: half of its noise is left of the sighting, and the truth within three deviations.
+static void test_sightings_heading_far_in_doubt_is_found_in_one_frame(void **state)
+{
+    static const double turns_deg[] = {-140, -90, -30, 30, 90, 140};
+    for (int i = 0; i < COUNT_OF(turns_deg); i++) {
+        const bslam_pose_t truth = {BSLAM_R(0.2), BSLAM_R(-0.1), real(turns_deg[i] * PI / 180)};
+        bslam_slam_t slam = turned(BSLAM_FILTER_INVARIANT, 50 * PI / 180);
+        const bslam_sighting_t seen = look(&truth, 4, 1, 7);
+        see_one(&slam, 0, seen);
+        assert_account(&slam, 0, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE);
+        const bslam_pose_t pose = bslam_slam_pose(&slam);
+        bslam_real_t x_m, y_m;
+        bslam_ekf_beacon_position(&slam.ekf, 0, &x_m, &y_m);
+        const bslam_sighting_t predicted = look(&pose, (double)x_m, (double)y_m, 7);
+        assert_near(unit_angle_between((double)predicted.bearing_rad, (double)seen.bearing_rad), 0, 0.01);
+        assert_near(predicted.range_m, seen.range_m, 0.025);
+        const double off[] = {(double)(pose.x_m - truth.x_m), (double)(pose.y_m - truth.y_m),
+                              unit_angle_between((double)pose.theta_rad, (double)truth.theta_rad)};
+        for (int k = 0; k < 3; k++) {
+            assert_near(off[k], 0, 3 * sqrt((double)bslam_ekf_covariance(&slam.ekf, k, k)));
+        }
+    }
+}
+
+/// Whether a frame is one step of the filter, to the bit.
+static bool is_one_step(int32_t filter, double heading_sd_rad, bool has_range)
+{
+    const bslam_pose_t on_axle = {0, 0, 0}, truth = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.1)};
+    bslam_slam_t slam = turned(filter, heading_sd_rad);
+    bslam_ekf_t ekf = slam.ekf;
+    bslam_sighting_t seen = look(&truth, 4, 1, 7);
+    seen.has_range = has_range;
+    bslam_innovation_t innovation;
+    bslam_fusion_t fusion;
+    assert_int_equal(bslam_ekf_innovation(&ekf, &slam.settings, &on_axle, &seen, 0, &innovation), BSLAM_OK);
+    assert_int_equal(bslam_ekf_fuse(&ekf, &slam.settings, &innovation, &fusion), BSLAM_OK);
+    bslam_ekf_correct(&ekf, &slam.settings);
+    see_one(&slam, 0, seen);
+    assert_account(&slam, 0, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE);
+    return memcmp(ekf.mean, slam.ekf.mean, sizeof ekf.mean) == 0 &&
+           memcmp(&ekf.factor, &slam.ekf.factor, sizeof ekf.factor) == 0;
+}
+
+/// Up to a variance of 0.03 rad².
+static void test_sightings_heading_that_is_known_is_corrected_in_one_step(void **state)
+{
+    assert_true(is_one_step(BSLAM_FILTER_INVARIANT, 2 * PI / 180, true));
+    assert_true(is_one_step(BSLAM_FILTER_INVARIANT, 0.173, true));
+    assert_false(is_one_step(BSLAM_FILTER_INVARIANT, 0.1735, true));
+    assert_true(is_one_step(BSLAM_FILTER_INVARIANT, 50 * PI / 180, false));
+    assert_true(is_one_step(BSLAM_FILTER_STANDARD, 50 * PI / 180, true));
+}
+
 static void test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing(void **state)
 {
     bslam_slam_t slam = running(unit_settings());
@@ -1382,6 +1453,8 @@ int main(void)
         cmocka_unit_test(test_resume_odometry_forgets_the_past_before_it),
         cmocka_unit_test(test_resume_odometry_with_a_clock_that_starts_over_goes_on),
         cmocka_unit_test(test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map),
+        cmocka_unit_test(test_sightings_heading_far_in_doubt_is_found_in_one_frame),
+        cmocka_unit_test(test_sightings_heading_that_is_known_is_corrected_in_one_step),
         cmocka_unit_test(test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing),
         cmocka_unit_test(test_resume_odometry_with_velocity_states_forgets_the_speed),
 
