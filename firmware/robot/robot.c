@@ -118,7 +118,7 @@ static bool open_cameras(robot_t *robot)
 /// What a camera sees has no label, and what it measures has its own noise.
 static void set_for_cameras(bslam_settings_t *settings)
 {
-    settings->association = BSLAM_APPEARANCE ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
+    settings->association = BSLAM_APPEARANCE ? BSLAM_ASSOCIATION_BOTH : BSLAM_ASSOCIATION_MAHALANOBIS;
     settings->recovery = BSLAM_RECOVERY;
     bslam_settings_preset(settings, BSLAM_PRESET_CAMERA);
 }

@@ -199,7 +199,7 @@ Counts = dict[tuple[str, bool], Counter[str]]
 
 def count_drive(seed: int) -> tuple[Counts, list[str]]:
     """The outcomes of one drive's robots, and a line about each that is not near."""
-    options = RunOptions(association="svm", sigma_mps=SIGMA_MPS, recovery="carried")
+    options = RunOptions(association="both", sigma_mps=SIGMA_MPS, recovery="carried")
     log = camera_log(load_scenario(SCENARIO), seed, SIGMA_MPS, None, load_rig(RIG), CameraStore(CAMERA_STORE))
     counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
     lines = []

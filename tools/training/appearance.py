@@ -4,7 +4,7 @@ Drives apart from all tests are shown to the learner as a robot would: a sample 
 When a beacon comes into view, each classifier says how near the sighting is to what it keeps and how it
 decides. A logistic function of these, and of the logarithm of how many samples there are, says how likely it
 is that beacon. Both answers, and all counts of samples, weigh alike. So do, of the others, those that some
-classifier knows and those that come into view for the first time, which no classifier was taught to refuse.
+classifier knows and those that come into view for the first time, which none was taught to refuse.
 
     python -m tools.training.appearance                       # 20 min on two cores
     python -m tools.training.appearance --camera 70000:70000  # simulated looks alone
@@ -123,8 +123,8 @@ def views(log: Log) -> list[Row]:
         for other, classifier in classifiers.items() if frame in VIEW_FRAMES else ():
             count = library.ask(classifier, _pointer(samples[i]), _pointer(answer))
             nearest, middle = np.sqrt(answer[:2]) / 127.0
-            is_it, is_known = other == beacon, beacon in classifiers
-            row = (count, float(nearest), float(middle), float(answer[2]), float(is_it), float(is_known))
+            whose = float(other == beacon), float(beacon in classifiers)
+            row = (count, float(nearest), float(middle), float(answer[2]), *whose)
             rows += [row] if count > 0 else []
         if beacon not in classifiers:
             classifiers[beacon] = library.add()
@@ -149,8 +149,7 @@ def _rendered(seed: int) -> list[Row]:
 
 @dataclass(frozen=True)
 class Views:
-    """Of many drives: samples, distances and decision values (n,); whether it was that beacon, and whether a
-    known one; by which drive."""
+    """Of many drives (n,): samples, distances, decision value; that beacon? a known one? in which drive."""
 
     samples: NDArray[np.float64]
     nearest: NDArray[np.float64]
@@ -170,7 +169,7 @@ class Views:
         return np.stack([one, distance, decided, more, more * distance, more * decided], axis=1)
 
     def answers(self) -> tuple[NDArray[np.bool_], ...]:
-        """Rows of that beacon; of another that is known; of a new one."""
+        """Rows of each of SHARES."""
         return self.is_it, ~self.is_it & self.is_known, ~self.is_known
 
     def bins(self) -> Iterator[NDArray[np.bool_]]:
@@ -217,19 +216,13 @@ def log_loss(
     """Balanced, for each range of COUNTS."""
     odds = np.clip(views.columns(method) @ coefficients, -ODDS_MAX, ODDS_MAX)
     loss = np.log1p(np.exp(np.where(views.is_it, -odds, odds)))
-    return [
-        sum(
-            share * float(loss[rows & use & answer].mean())
-            for answer, share in zip(views.answers(), SHARES, strict=True)
-        )
-        for rows in views.bins()
-    ]
+    parts = list(zip(views.answers(), SHARES, strict=True))
+    return [sum(part * float(loss[rows & use & one].mean()) for one, part in parts) for rows in views.bins()]
 
 
 def _line(method: str, coefficients: NDArray[np.float64]) -> str:
-    numbers = ", ".join(f"{one:.3f}f" if one else "0" for one in coefficients)
-    to_middle = "true" if METHODS[method][1] else "false"
-    return f"    static const bslam_calibration_t {method} = {{{numbers}, {to_middle}}};"
+    numbers = [f"{one:.3f}f" if one else "0" for one in coefficients] + [str(METHODS[method][1]).lower()]
+    return f"    static const bslam_calibration_t {method} = {{{', '.join(numbers)}}};"
 
 
 def write(table: dict[str, NDArray[np.float64]]) -> None:
@@ -255,9 +248,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--simulated", type=_range, default=range(60000, 60048), help="seeds A:B")
-    parser.add_argument(
-        "--camera", type=_range, default=range(60000, 60008), help="seeds A:B of rendered drives"
-    )
+    parser.add_argument("--camera", type=_range, default=range(60000, 60008), help="the same, rendered")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     sources = {

@@ -346,7 +346,8 @@ static void augment(bslam_slam_t *slam, const bslam_vantage_t *vantage, int coun
     }
 }
 
-/// A step towards a heading that is far in doubt: matches at a part of their worth. False: none goes anywhere.
+/// A step towards a heading that is far in doubt: matches at a part of their worth. False: none goes
+/// anywhere.
 static bool take_step(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
     const bslam_real_t gate_d2 = gate_of(slam, vantage->moment_us);

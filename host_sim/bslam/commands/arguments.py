@@ -61,7 +61,7 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     )
     associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
     meaning = (
-        "whose a sighting is; known:RATE: identity wrong at that rate (default: svm where sightings have "
+        "whose a sighting is; known:RATE: identity wrong at that rate (default: both where sightings have "
         "signatures and the map is not known, else known; mahalanobis on a log without identities)"
     )
     add("association", _association, None, associations, meaning)

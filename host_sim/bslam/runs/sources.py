@@ -40,7 +40,7 @@ class Says:
     @property
     def association(self) -> str:
         """What tells whose they are."""
-        return "svm" if self.signatures else "known" if self.identities else "mahalanobis"
+        return "both" if self.signatures else "known" if self.identities else "mahalanobis"
 
 
 def what_it_says(log: Log) -> Says:
