@@ -197,8 +197,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, con
                                                      const bslam_sighting_t *sighting, int index,
                                                      bslam_innovation_t *innovation);
 
-/// Adds noise to an innovation of distance and direction, so that it makes a step of the way where the model
-/// is not straight as far as the direction is in doubt. False, and as it was: it is straight. O(n²).
+/// Adds noise to an innovation of distance and direction, so that it makes a step of the way, where the model
+/// is not straight as far as the direction is in doubt. False, and no change: it is straight. O(n).
 bool bslam_ekf_soften(const bslam_ekf_t *ekf, bslam_innovation_t *innovation);
 
 /// Squared Mahalanobis distance of an innovation, by equation (8)'s S, from the covariance as it stands.

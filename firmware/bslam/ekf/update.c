@@ -355,12 +355,13 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
 
 bool bslam_ekf_soften(const bslam_ekf_t *ekf, bslam_innovation_t *innovation)
 {
-    const forms_t p = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
+    const forms_t p = quadratic(ekf, &innovation->bearing_row, &innovation->bearing_row);
     if (p.bb <= STRAIGHT_VAR_RAD2) {
         return false;
     }
-    innovation->range_var_m2 += STEP_SHARE * p.aa;
-    innovation->bearing_var_rad2 += STEP_SHARE * p.bb;
+    const bslam_real_t factor = 1 + STEP_SHARE * p.bb / innovation->bearing_var_rad2;
+    innovation->range_var_m2 *= factor;
+    innovation->bearing_var_rad2 *= factor;
     return true;
 }
 

@@ -84,16 +84,19 @@ void bslam_slam_confirm_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
     decide(slam, beacon);
 }
 
-void bslam_slam_confirm_again(const bslam_slam_t *slam, bslam_beacon_t *beacon, int64_t time_us)
+bool bslam_slam_confirm_again(const bslam_slam_t *slam, bslam_beacon_t *beacon, int64_t time_us)
 {
     const bslam_settings_t *settings = &slam->settings;
     const bool was_glimpsed =
         !beacon->confirmed && !beacon->has_scores && beacon->views >= settings->confirm_sightings;
-    if (was_glimpsed && settings->confirm_window_us > 0 &&
-        time_us - beacon->last_seen_us > settings->confirm_window_us) {
-        beacon->first_seen_us = time_us;
-        beacon->views = 0;
+    if (!was_glimpsed || settings->confirm_window_us == 0 ||
+        time_us - beacon->last_seen_us <= settings->confirm_window_us) {
+        return false;
     }
+    beacon->first_seen_us = time_us;
+    beacon->view_um = slam->travelled_um;
+    beacon->views = 1;
+    return true;
 }
 
 void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,

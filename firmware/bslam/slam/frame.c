@@ -83,9 +83,11 @@ static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
                        bslam_beacon_t *beacon, bslam_real_t distance2)
 {
     beacon->sightings++;
-    bslam_slam_confirm_again(slam, beacon, time_us);
+    const bool is_again = bslam_slam_confirm_again(slam, beacon, time_us);
     beacon->last_seen_us = time_us;
-    bslam_slam_confirm_match(slam, beacon, sighting, distance2);
+    if (!is_again) {
+        bslam_slam_confirm_match(slam, beacon, sighting, distance2);
+    }
 }
 
 /// A sighting of what may be no beacon moves nothing, but says whether it is one.
@@ -346,6 +348,12 @@ static void augment(bslam_slam_t *slam, const bslam_vantage_t *vantage, int coun
     }
 }
 
+/// Of others a vote decides, once, what a distance is used for.
+static bool has_one_distance(const bslam_beacon_t *beacon)
+{
+    return beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_KNOWN;
+}
+
 /// A step towards a heading that is far in doubt: matches at a part of their worth. False: none goes
 /// anywhere.
 static bool take_step(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
@@ -356,6 +364,7 @@ static bool take_step(bslam_slam_t *slam, const bslam_vantage_t *vantage, int co
         bslam_record_t *record = &slam->records[i];
         bslam_innovation_t *innovation = &record->innovation;
         innovation->has_range = record->match.verdict == BSLAM_VERDICT_MATCH &&
+                                has_one_distance(&slam->ekf.beacons[record->match.beacon]) &&
                                 innovation_of(slam, vantage, record, innovation) == BSLAM_OK &&
                                 innovation->has_range && bslam_ekf_soften(&slam->ekf, innovation);
         innovation->gate_d2 = gate_d2;

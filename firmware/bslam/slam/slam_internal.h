@@ -37,8 +37,8 @@ void bslam_slam_note_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sigh
 void bslam_slam_confirm_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
 
 /// One that was glimpsed, not seen for long enough, and comes again after a while has all to prove anew: else
-/// an accident would confirm it. Before it is noted that it is seen.
-void bslam_slam_confirm_again(const bslam_slam_t *slam, bslam_beacon_t *beacon, int64_t time_us);
+/// an accident would confirm it. Before it is noted that it is seen. False: it is not such a one.
+bool bslam_slam_confirm_again(const bslam_slam_t *slam, bslam_beacon_t *beacon, int64_t time_us);
 
 /// A sighting was matched with it, at this squared Mahalanobis distance: it may be confirmed by that.
 void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,

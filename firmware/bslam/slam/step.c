@@ -150,8 +150,8 @@ static bool branch(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bsl
     bslam_bar_t bar = {.sighting = i};
     const bslam_match_t *match = &slam->records[i].match;
     bslam_real_t gap = match->lead;
-    while (gap < slam->settings.doubt_nats && has_room(slam, gap) &&
-           (is_made(match) || match->verdict == BSLAM_VERDICT_TENTATIVE)) {
+    while (gap < slam->settings.doubt_nats && (is_made(match) || match->verdict == BSLAM_VERDICT_TENTATIVE) &&
+           has_room(slam, gap)) {
         bslam_hypothesis_t *other = &slam->doubts->others[slam->doubts->count];
         bar.choices[bar.count++] = match->beacon;
         bslam_hypothesis_copy(slam, other);

@@ -184,7 +184,7 @@ static void test_start_with_a_camera_runs_what_its_figures_were_measured_with(vo
 {
     bslam_settings_t expected;
     bslam_settings_preset(&expected, BSLAM_PRESET_REAL_WHEELS);
-    expected.association = BSLAM_ASSOCIATION_SVM;
+    expected.association = BSLAM_ASSOCIATION_BOTH;
     bslam_settings_preset(&expected, BSLAM_PRESET_CAMERA);
     cameras = 1;
     assert_int_equal(start(), ROBOT_STARTED_EMPTY);

@@ -888,7 +888,8 @@ static dense_t doubt_direction(bslam_ekf_t *ekf, int beacon, double variance_rad
     return dense_sandwich(&rows, &covariance);
 }
 
-static void test_soften_adds_a_quarter_of_the_prediction_where_its_direction_is_far_in_doubt(void **state)
+static void
+test_soften_adds_a_quarter_of_the_directions_doubt_and_as_many_times_the_distances_noise(void **state)
 {
     static const double variances_rad2[] = {0.001, 0.0299, 0.0301, 0.5};
     bslam_settings_t settings = params_of(1, true);
@@ -904,7 +905,8 @@ static void test_soften_adds_a_quarter_of_the_prediction_where_its_direction_is_
         memcpy(&before, &innovation, sizeof before);
         assert_int_equal(bslam_ekf_soften(&ekf, &innovation), variance_rad2 > 0.03);
         if (variance_rad2 > 0.03) {
-            const double range_m2 = hph.at[0][0] / 4, bearing_rad2 = hph.at[1][1] / 4;
+            const double bearing_rad2 = hph.at[1][1] / 4;
+            const double range_m2 = before.range_var_m2 * bearing_rad2 / before.bearing_var_rad2;
             assert_near(innovation.range_var_m2 - before.range_var_m2, range_m2, TOLERANCE * range_m2);
             assert_near(innovation.bearing_var_rad2 - before.bearing_var_rad2, bearing_rad2,
                         TOLERANCE * bearing_rad2);
@@ -949,7 +951,8 @@ int main(void)
         cmocka_unit_test(test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular),
         cmocka_unit_test(test_fuse_and_distance2_of_an_indefinite_state_are_singular),
 
-        cmocka_unit_test(test_soften_adds_a_quarter_of_the_prediction_where_its_direction_is_far_in_doubt),
+        cmocka_unit_test(
+            test_soften_adds_a_quarter_of_the_directions_doubt_and_as_many_times_the_distances_noise),
 
         cmocka_unit_test(test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible),
         cmocka_unit_test(test_fuse_in_a_doubt_shared_with_beacons_close_by_leaves_correlations_possible),

@@ -292,8 +292,8 @@ static void assert_leaves_after(int64_t us)
     assert_int_equal(slam.counters.removed, 1);
 }
 
-/// Seen too rarely it has a window from the first sighting on. Glimpsed, it stays; but it is no accident a while
-/// later that confirms it: that begins another window.
+/// Seen too rarely it has a window from the first sighting on. Glimpsed, it stays; but it is no accident a
+/// while later that confirms it: that begins another window.
 static void test_by_likelihood_what_was_glimpsed_has_all_to_prove_anew(void **state)
 {
     enum { WINDOW_US = LASTING_US };

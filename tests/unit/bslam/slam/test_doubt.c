@@ -550,7 +550,7 @@ static void test_a_slip_is_paid_for_once_in_a_view(void **state)
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
     bslam_slam_attach_appearance(&slam, &appearance);
     know_two();
-    unit_give_machine(&appearance, 0, 1, 16);
+    unit_give_machine(&appearance, 0, 2, 16);
     unit_give_machine(&appearance, 1, -2, 16);
     see(1, &DOUBTFUL_RAD, 1);
     for (int n = 0; n < VIEWS * SEEN; n++) {
