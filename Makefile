@@ -39,21 +39,16 @@ setup-run:
 	@$(MAKE) --silent extension
 
 EXTENSION_STAMP := build/extension.stamp
-EXTENSION_BUILD := host_sim/bslam/core/build.py host_sim/bslam/core/builds.py
-CAMERA_DIR := host_sim/bslam/world/camera
-CAMERA_STAMP := build/camera.stamp
+EXTENSION_BUILD := setup.py host_sim/bslam_build.py host_sim/bslam/core/builds.py
 
 .PHONY: extension
-extension: $(EXTENSION_STAMP) $(CAMERA_STAMP)
+extension: $(EXTENSION_STAMP)
 
-$(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(wildcard firmware/models/*.h) \
-    $(VENV)/run.stamp
-	@echo "setup: building the cffi extensions"
-	@$(PYTHON) -m bslam.core.build
-	@mkdir -p $(@D) && touch $@
-
-$(CAMERA_STAMP): $(CAMERA_DIR)/build.py $(wildcard $(CAMERA_DIR)/*.[ch]) $(VENV)/run.stamp
-	@$(PYTHON) $(CAMERA_DIR)/build.py
+# What is newer than its sources is left alone: the first time pip has built it (tools/setup.sh).
+$(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(CAMERA_SOURCES) $(CAMERA_HEADERS) \
+    $(wildcard firmware/models/*.h) $(VENV)/run.stamp
+	@echo "setup: building the extensions"
+	@$(PYTHON) setup.py --quiet build_ext --inplace
 	@mkdir -p $(@D) && touch $@
 
 # --- The main job -------------------------------------------------------------------------------------------

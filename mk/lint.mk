@@ -9,7 +9,7 @@ CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
 CAMERA_HEADERS := $(wildcard host_sim/bslam/world/camera/*.h)
 C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES) $(CAMERA_SOURCES) $(CAMERA_HEADERS) \
     $(ROBOT_FILES))
-PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
+PYTHON_DIRS := $(wildcard setup.py host_sim tools tests/python)
 
 LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \
     lint-complexity lint-version lint-limits

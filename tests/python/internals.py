@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import fcntl
 import importlib.util
-import sysconfig
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 
 from bslam.core import CoreError, Slam
 from bslam.core.appearance import SIGNATURE_SIZE, encode
-from bslam.core.build import SOURCES, Macros, compile_extension, declarations, macros_of
-from bslam.core.builds import FIRMWARE_DIR, SIZE_CLASSES
+from bslam.core.builds import SIZE_CLASSES
 from bslam.errors import BslamError
+from bslam_build import FIRMWARE_DIR, SOURCES, Extension, build, estimator, macros_of
 
 Floats = NDArray[np.float32]
 HEADER = "bslam/internal.h"
@@ -31,25 +30,23 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "internals"
 def internals(real: str, beacons_max: int) -> Any:
     """The estimator's insides: a module with `ffi` and `lib`, the smallest build of so many beacons."""
     size = next(one for one in SIZE_CLASSES if one >= beacons_max)
-    return _extension(f"_internals_{real}_{size}", HEADER, "bslam", macros_of(real, size))
+    return _loaded(estimator(f"_internals_{real}_{size}", real, size, HEADER, declares=""))
 
 
 @cache
 def link_library() -> Any:
     """The link's parser, as a module with `ffi` and `lib`."""
-    return _extension("_link", "link/parser.h", "link", macros_of("float", SIZE_CLASSES[0]))
+    macros = macros_of("float", SIZE_CLASSES[0])
+    return _loaded(Extension("_link", FIRMWARE_DIR, SOURCES["link"], "link/parser.h", macros=macros))
 
 
-def _extension(name: str, header: str, library: str, macros: Macros) -> Any:
-    """Of a header and its library; built where it is not there, or older than its sources."""
-    path = FOLDER / (name + sysconfig.get_config_var("EXT_SUFFIX"))
+def _loaded(extension: Extension) -> Any:
+    """Its module; built where it is not there, or older than its sources."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    files = [file for folder in SOURCES[library] for file in (FIRMWARE_DIR / folder).rglob("*.[ch]")]
+    name = extension.name
     with (FOLDER / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another process of these tests may be at it
-        if not path.is_file() or path.stat().st_mtime < max(file.stat().st_mtime for file in files):
-            declared = declarations(macros, header)
-            compile_extension(name, declared, f'#include "{header}"', macros, library, FOLDER)
+        path = build(extension, FOLDER)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

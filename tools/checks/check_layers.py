@@ -114,7 +114,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
 }
 # The command line ties the parts together and may import them all; so does what the package offers its users.
 PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})
-RAW_LAYERS = frozenset({"core/build.py", "core/raw.py", "world/camera/build.py", "world/camera/raw.py"})
+RAW_LAYERS = frozenset({"core/raw.py", "world/camera/raw.py"})
 EXTENSIONS = re.compile(r"bslam\.(core|world\.camera)\._[a-z]")
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')

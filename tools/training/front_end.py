@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import fcntl
 import importlib.util
-import sysconfig
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -19,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core import vision
-from bslam.core.build import SOURCES, build_vision
-from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.raw import VisionLibrary
 from bslam.core.vision import SIGNATURE_SIZE, Candidate
 from bslam.modelfile import BeaconClass
+from bslam_build import build
+from bslam_build import vision as vision_extension
 
 EXTENSION = "_vision_training"
 HEADER = "vision/internal.h"
@@ -47,22 +46,15 @@ def open_library() -> VisionLibrary:
     """The build that shows what is inside: all that the product's has, and more. Made where it is missing or
     old.
     """
-    path = FOLDER / (EXTENSION + sysconfig.get_config_var("EXT_SUFFIX"))
     FOLDER.mkdir(parents=True, exist_ok=True)
     with (FOLDER / f"{EXTENSION}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another process may be at it
-        if not path.is_file() or path.stat().st_mtime < _newest_source():
-            build_vision(EXTENSION, HEADER, FOLDER)
+        path = build(vision_extension(EXTENSION, HEADER), FOLDER)
     spec = importlib.util.spec_from_file_location(EXTENSION, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return VisionLibrary(module)
-
-
-def _newest_source() -> float:
-    folders = (*SOURCES["vision"], "models")
-    return max(file.stat().st_mtime for one in folders for file in (FIRMWARE_DIR / one).rglob("*.[ch]"))
 
 
 class FrontEnd(vision.FrontEnd):

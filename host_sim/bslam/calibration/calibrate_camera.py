@@ -232,7 +232,7 @@ def as_toml(
 
 def _opencv() -> Any:
     if cv2 is None:
-        raise BslamError("calibrate camera: OpenCV is not installed; allowed: pip install 'bslam[camera]'")
+        raise BslamError("calibrate camera: OpenCV is missing; allowed: pip install opencv-python-headless")
     return cv2
 
 

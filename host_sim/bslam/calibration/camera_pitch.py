@@ -16,7 +16,6 @@ from bslam.core.vision import Candidate, FrontEnd, Picture
 from bslam.datasets.pictures import SUFFIXES, load_picture
 from bslam.errors import BslamError
 from bslam.rig import Camera
-from bslam.world.camera.lens import unproject
 from bslam.world.kinds import KINDS, Kind
 
 _SCORE_MIN: Final = -0.15
@@ -133,6 +132,8 @@ def _stands_across(kind: Kind, height_m: float) -> bool:
 
 
 def _turn(one: Candidate, camera: Camera) -> float:
+    from bslam.world.camera.lens import unproject  # here: most commands need no ray caster
+
     kind = KINDS[one.kind]
     low_m = kind.bottom_m[0] - camera.z_m
     high_m = low_m + kind.height_m

@@ -92,11 +92,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    try:
-        from bslam.view.live import Page  # here: it takes a second, which no other command need wait
-        from bslam.view.serve import has_screen, serve
-    except ImportError as error:
-        raise BslamError(f"{error}; allowed: pip install 'bslam[live]'") from error
+    from bslam.view.live import Page  # here: it takes a second, which no other command need wait
+    from bslam.view.serve import has_screen, serve
+
     job = _job(arguments)
     show = _Show(job, arguments.out.absolute(), arguments.speed)
 

@@ -153,7 +153,7 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
             write_parquet(out / PARQUET, result.entries)
             files.insert(0, PARQUET)
         except ImportError as error:
-            print(f"no {PARQUET}: {error}; pip install 'bslam[sweep]', and the same command writes it")
+            print(f"no {PARQUET}: {error}; pip install pyarrow, and the same command writes it")
     if result.kept:
         print(f"{result.kept} of {len(result.entries)} runs were there already")
     print(f"files in {out}: {', '.join(files)}")

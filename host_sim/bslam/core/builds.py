@@ -1,8 +1,4 @@
-"""Which builds of the C library there are, one a scalar type and size class, and where its sources are."""
-
-from pathlib import Path
-
-FIRMWARE_DIR = Path(__file__).resolve().parents[3] / "firmware"
+"""Which extensions there are; bslam_build.py beside the package makes them."""
 
 SIZE_CLASSES = (20, 80, 250)
 """Beacons that a build holds; `Slam` takes the smallest that suffices."""
@@ -18,3 +14,6 @@ def extension_name(real: str, beacons_max: int) -> str:
 
 VISION_EXTENSION = "bslam.core._vision"
 """The build of the vision front end: it holds no map, so one size serves all."""
+
+CAMERA_EXTENSION = "bslam.world.camera._render"
+"""The ray caster of the simulated camera."""

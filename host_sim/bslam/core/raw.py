@@ -28,6 +28,8 @@ class Library:
         self.beacons_max = beacons_max
         self.ffi = module.ffi
         self.lib = module.lib
+        self.sources = self.text(self.lib.SOURCES_DIGEST)
+        """SHA-256 of the C sources that it was made of."""
         self.map_faults = self.enum_names("bslam_map_fault_t", "BSLAM_MAP_", space=" ")
         _answer_callbacks(self.ffi)
 
@@ -152,6 +154,8 @@ class VisionLibrary:
     def __init__(self, module: Any) -> None:
         self.ffi = module.ffi
         self.lib = module.lib
+        self.sources: str = self.ffi.string(self.lib.SOURCES_DIGEST).decode()
+        """SHA-256 of the C sources that it was made of."""
 
     def ensure(self, status: int, message: str) -> None:
         """Raises CoreError unless status is BSLAM_OK."""

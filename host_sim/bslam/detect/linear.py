@@ -9,11 +9,6 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 
-try:
-    from sklearn.svm import LinearSVC
-except ImportError:  # an extra
-    LinearSVC = None
-
 _COST: Final = 0.01
 _UNIT: Final = 128.0  # of a cell's values
 
@@ -22,8 +17,10 @@ def fit_linear(
     examples: NDArray[np.uint8], negatives: NDArray[np.uint8]
 ) -> tuple[NDArray[np.float32], float]:
     """Weights (rows, columns, CHANNELS) for cells, and bias. BslamError if scikit-learn is missing."""
-    if LinearSVC is None:
-        raise BslamError("training needs scikit-learn; allowed: pip install 'bslam[detect]'")
+    try:
+        from sklearn.svm import LinearSVC  # an extra, and it takes seconds
+    except ImportError:
+        raise BslamError("training needs scikit-learn; allowed: pip install scikit-learn") from None
     both = np.concatenate([examples, negatives])
     x = both.reshape(len(both), -1).astype(np.float32) / _UNIT
     y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from scipy.ndimage import gaussian_filter
 from bslam.core.vision import Candidate, FrontEnd
 from bslam.faults.promise import Fault, Measured
 from bslam.rig import Camera, load_rig
-from bslam.world.camera import Frame, Renderer, make_world, walk
+
+if TYPE_CHECKING:
+    from bslam.world.camera import Frame
 
 Picture = NDArray[np.uint8]
 
@@ -30,6 +32,8 @@ def _camera() -> Camera:
 @cache
 def _frames() -> tuple[Frame, ...]:
     """Of walks through rendered worlds of the test set."""
+    from bslam.world.camera import Renderer, make_world, walk  # here: most commands need no ray caster
+
     frames = []
     for seed in range(_FIRST_WORLD, _FIRST_WORLD + _WORLDS):
         scene = make_world(seed, "test")

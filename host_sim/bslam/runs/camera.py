@@ -13,14 +13,14 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import bslam.world as world_package
 from bslam.core.appearance import rendered_seeds
-from bslam.core.builds import FIRMWARE_DIR
+from bslam.core.raw import vision_library
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
@@ -29,9 +29,11 @@ from bslam.rig import Rig
 from bslam.runs.compass import Compass
 from bslam.scannerfile import ScannerModel, scanner_text
 from bslam.world.arena import Arena, Beacon
-from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Mismatch, Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
+
+if TYPE_CHECKING:
+    from bslam.world.camera import Scene
 
 # What is left of an object's errors stays alike for so far, metres. Tried on paper_room, seeds 1020:1036 and
 # 1040:1060; through a lens of 180 degrees, of which a pixel sees three times as much, on 1020:1023.
@@ -186,6 +188,8 @@ def unseen_log(
     model: ScannerModel | None = None,
 ) -> tuple[Log, Iterator[Glance]]:
     """The same before anything is seen, so without sightings, and what its cameras will see, step by step."""
+    from bslam.world.camera import dress  # here: most commands need no ray caster
+
     scenario = _checked(scenario, sigma_mps, noise, rig)
     scene = dress(scenario, seed)
     nothing = CameraDrive(_places(scene), np.empty(0, SEEN), np.empty(0, TURNS))
@@ -234,6 +238,8 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive, are_bui
 
 def watch(scenario: Scenario, seed: int, rig: Rig, model: ScannerModel | None = None) -> CameraDrive:
     """Drive, render one frame a step, the cameras in turn, and keep what the front end sees in each."""
+    from bslam.world.camera import dress
+
     scene = dress(scenario, seed)
     rows: list[tuple[Any, ...]] = []
     turns: list[tuple[Any, ...]] = []
@@ -258,6 +264,8 @@ def _watch(
     scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: Threshold, model: ScannerModel | None
 ) -> Iterator[Glance]:
     """One frame a step."""
+    from bslam.world.camera import Renderer
+
     path = true_drive(scenario, seed)
     renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
     front_end, aim = FrontEnd(rig.cameras, model, threshold=threshold.least), Aim(rig)
@@ -333,14 +341,14 @@ def covering_beacon(outline: tuple[float, float, float, float], identity: NDArra
 
 def _digest(scenario: Scenario, rig: Rig, model: ScannerModel | None) -> str:
     """Of all that decides what is seen: scenario, rig, model, and the code that renders and looks."""
+    from bslam.world.camera.raw import SOURCES
+
     if scenario.wheels.noise == "speedometer":  # what a reading errs by does not change the path
         scenario = replace(scenario, wheels=replace(scenario.wheels, sigma_mps=0.0, draw=0))
     words = hashlib.sha256(repr((scenario, rig, SEEN)).encode())
     if model is not None:
         words.update(scanner_text(model).encode())
-    world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "vision"
-    code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.rglob("*.[ch]")]
-    code += [*(FIRMWARE_DIR / "base").glob("*.[ch]"), *(FIRMWARE_DIR / "models").glob("beacons*.h")]
-    for path in sorted(code):
+    words.update(f"{vision_library().sources} {SOURCES}".encode())
+    for path in sorted(Path(world_package.__file__).parent.rglob("*.py")):
         words.update(path.read_bytes())
     return words.hexdigest()[:12]

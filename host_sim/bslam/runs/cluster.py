@@ -20,7 +20,7 @@ def cluster(address: str) -> Iterator[str]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise BslamError(f"--cluster: {error}; allowed: pip install 'bslam[cluster]'") from error
+        raise BslamError(f"--cluster: {error}; allowed: pip install dask distributed") from error
     try:
         client = Client(address, timeout=_PATIENCE_S, set_as_default=True)
     except (OSError, ValueError, TypeError) as error:

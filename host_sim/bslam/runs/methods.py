@@ -65,7 +65,7 @@ def shipped_methods(map_every: int) -> list[Method]:
             f"{folder}.isam2:Isam2",
             "GTSAM's incremental smoother",
             needs=("gtsam",),
-            install="pip install 'bslam[isam2]'",
+            install="pip install gtsam",
             shipped=True,
         ),
         Method(

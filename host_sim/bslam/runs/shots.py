@@ -14,7 +14,6 @@ from PIL import Image
 from bslam.datasets.pictures import SUFFIXES, camera_for, load_picture, scale_picture
 from bslam.errors import BslamError
 from bslam.rig import Camera, Rig
-from bslam.world.camera import Renderer, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import true_drive
 
@@ -60,6 +59,8 @@ def simulated(scenario: Scenario, seed: int, rig: Rig, frames: int, every_s: flo
 
 
 def _drive_shots(scenario: Scenario, seed: int, rig: Rig, frames: int, every_s: float) -> Iterator[Shot]:
+    from bslam.world.camera import Renderer, dress  # here: most commands need no ray caster
+
     path = true_drive(scenario, seed)
     scene = dress(scenario, seed)
     renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
@@ -105,7 +106,9 @@ def video(path: Path, rig: Rig | None, frames: int, every_s: float) -> Source:
     BslamError if it cannot be read, or OpenCV is missing.
     """
     if cv2 is None:
-        raise BslamError(f"{path}: a video needs OpenCV; allowed: pip install 'bslam[camera]', or pictures")
+        raise BslamError(
+            f"{path}: a video needs OpenCV; allowed: pip install opencv-python-headless, or pictures"
+        )
     reader = cv2.VideoCapture(str(path))
     good, first = reader.read()
     if not good:

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import bslam
-from bslam.core.builds import FIRMWARE_DIR
+from bslam.core.builds import REALS, SIZE_CLASSES
+from bslam.core.raw import library, vision_library
 from bslam.errors import BslamError
 from bslam.evaluation.failure import was_off
 from bslam.options import RunOptions
@@ -56,8 +57,9 @@ class SweepResult:
 def code_digest() -> str:
     """Of the program: runs of two versions are not one sweep."""
     files = [*Path(bslam.__file__).parent.rglob("*.py"), *Path(bslam.__file__).parent.rglob("*.toml")]
-    files += [*Path(bslam.__file__).parent.rglob("*.npy"), *FIRMWARE_DIR.rglob("*.[ch]")]
-    digest = hashlib.sha256()
+    files += Path(bslam.__file__).parent.rglob("*.npy")
+    digest = hashlib.sha256(library(REALS[0], SIZE_CLASSES[0]).sources.encode())
+    digest.update(vision_library().sources.encode())
     for path in sorted(files):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

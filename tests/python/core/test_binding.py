@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from bslam.core import CoreError, Slam
-from bslam.core.builds import FIRMWARE_DIR, SIZE_CLASSES
+from bslam.core.builds import SIZE_CLASSES
 from bslam.errors import BslamError
+from bslam_build import FIRMWARE_DIR
 from core import instance
 from core.feeding import KINDS, feed
 from reference.runs import PARAMS, run

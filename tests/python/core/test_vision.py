@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from bslam.core import CoreError
-from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.vision import FrontEnd
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, make_world, walk
+from bslam_build import FIRMWARE_DIR
 from tools.training.front_end import FrontEnd as OpenFrontEnd
 
 

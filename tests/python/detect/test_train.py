@@ -216,7 +216,7 @@ def test_whole_weights_decide_as_scikit_learn_does(monkeypatch):
             machines.append(self)
             return super().fit(*arguments)
 
-    monkeypatch.setattr(linear, "LinearSVC", Kept)
+    monkeypatch.setattr("sklearn.svm.LinearSVC", Kept)
     examples = rng.integers(0, 256, (40, 6, 5, 8), dtype=np.uint8)
     negatives = rng.integers(0, 256, (300, 6, 5, 8), dtype=np.uint8)
     examples[..., 1] //= 4

@@ -18,6 +18,8 @@ except ImportError as error:
 
 Floats = NDArray[np.float64]
 ffi, lib = _render.ffi, _render.lib
+SOURCES: str = ffi.string(lib.SOURCES_DIGEST).decode()
+"""SHA-256 of the C sources that it was made of."""
 
 LIGHT_NODES = lib.RENDER_LIGHT_NODES
 CUT_OUT = lib.RENDER_CUT_OUT
