@@ -1,0 +1,106 @@
+// A robot with wheel encoders on interrupts and a tag detector on Serial1; its pose comes out on Serial.
+// For boards of 32 bits with 22 KB of RAM to spare: RP2040, ESP32, Nano 33, Teensy, Due.
+#include <bslam/bslam.h>
+
+// Your robot: pins of each encoder's two channels, and its measures (docs/TUNING.md says how to find them).
+const int LEFT_A = 2, LEFT_B = 4, RIGHT_A = 3, RIGHT_B = 5;
+const float WHEELBASE_M = 0.2f, WHEEL_RADIUS_M = 0.033f, CAMERA_AHEAD_M = 0.05f;
+const int TICKS_PER_REVOLUTION = 1440;  // edges of channel A in a turn of the wheel
+const int64_t STEP_US = 40000;
+
+static bslam_t robot;              // all the memory that the filter has
+static unsigned refused = 0;       // readings and sightings that it did not take: bslam_status_name says why
+static volatile uint32_t left_ticks = 0, right_ticks = 0;
+
+static void left_edge() {
+  left_ticks += digitalRead(LEFT_A) == digitalRead(LEFT_B) ? -1 : 1;
+}
+
+static void right_edge() {
+  right_ticks += digitalRead(RIGHT_A) == digitalRead(RIGHT_B) ? -1 : 1;
+}
+
+/// micros() begins again after 71 minutes; this does not.
+static int64_t now_us() {
+  static int64_t now = 0;
+  now += (uint32_t)(micros() - (uint32_t)now);
+  return now;
+}
+
+void setup() {
+  Serial.begin(115200);
+  Serial1.begin(115200);
+  const int pins[] = {LEFT_A, LEFT_B, RIGHT_A, RIGHT_B};
+  for (int pin : pins) {
+    pinMode(pin, INPUT_PULLUP);
+  }
+  attachInterrupt(digitalPinToInterrupt(LEFT_A), left_edge, CHANGE);
+  attachInterrupt(digitalPinToInterrupt(RIGHT_A), right_edge, CHANGE);
+
+  bslam_settings_t settings;
+  int bad_setting = 0;
+  bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
+  settings.wheelbase_m = WHEELBASE_M;
+  settings.left_radius_m = settings.right_radius_m = WHEEL_RADIUS_M;
+  settings.ticks_per_revolution = TICKS_PER_REVOLUTION;
+  settings.counter_bits = 32;
+  settings.mount_x_m = CAMERA_AHEAD_M;
+  while (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
+    Serial.println(bslam_settings_info(bad_setting)->name);  // is out of its range
+    delay(1000);
+  }
+}
+
+/// "AGE_MS TAG BEARING_MRAD RANGE_MM": a tag, left positive. It counts from when the picture was taken.
+static void take_sighting(const char *line) {
+  int age_ms = 0, tag = 0, mrad = 0, mm = 0;
+  char more;
+  const bool is_whole = sscanf(line, "%d %d %d %d%c", &age_ms, &tag, &mrad, &mm, &more) == 4;  // else noise
+  bslam_sighting_t seen = {};
+  seen.label = tag;
+  seen.bearing_rad = 1e-3f * mrad;
+  seen.range_m = 1e-3f * mm;
+  seen.has_range = true;
+  refused += !is_whole || bslam_sightings(&robot, now_us() - 1000LL * age_ms, &seen, 1) != BSLAM_OK;
+}
+
+static void listen_to_detector() {
+  static char line[64];
+  static size_t length = 0;
+  while (Serial1.available() > 0) {
+    const char byte = Serial1.read();
+    if (byte == '\n' || length == sizeof line - 1) {  // what is too long is noise
+      line[length] = '\0';
+      length = 0;
+      take_sighting(line);
+    } else if (byte != '\r') {
+      line[length++] = byte;
+    }
+  }
+}
+
+static void read_wheels() {
+  bslam_odometry_reading_t wheels = {};
+  noInterrupts();
+  wheels.left_ticks = left_ticks;
+  wheels.right_ticks = right_ticks;
+  interrupts();
+  wheels.time_us = now_us();
+  wheels.source = BSLAM_ODOMETRY_TICKS;
+  refused += bslam_odometry(&robot, &wheels) != BSLAM_OK;
+}
+
+void loop() {
+  static int64_t step_us = 0;
+  listen_to_detector();
+  if (now_us() - step_us < STEP_US) {
+    return;
+  }
+  step_us = now_us();
+  read_wheels();
+  const bslam_pose_t pose = bslam_pose(&robot);  // what your robot steers by
+  char text[80];
+  snprintf(text, sizeof text, "%d mm, %d mm, %d mrad, %d beacons, %u refused", (int)(1e3f * pose.x_m),
+           (int)(1e3f * pose.y_m), (int)(1e3f * pose.theta_rad), (int)bslam_health(&robot).beacons, refused);
+  Serial.println(text);
+}
