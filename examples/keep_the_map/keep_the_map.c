@@ -1,0 +1,115 @@
+// Keep the map, load it, find oneself. The first run drives through a room and saves its map; each later run
+// loads it, starts somewhere in the room, does not know where, and finds out.
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "bslam/bslam.h"
+
+static bslam_t robot;
+
+// ---- the room, in place of your robot's sensors: a circle of 1 m among five tags, a left wheel that slips
+// -----
+
+static const float tags[5][2] = {{2.2f, 0.5f}, {1.2f, 2.8f}, {-2.1f, 1.6f}, {-1.0f, -1.4f}, {1.5f, -1.2f}};
+
+static bslam_pose_t true_pose(int64_t time_us)
+{
+    const float turned_rad = 0.3e-6f * (float)time_us;
+    return (bslam_pose_t){sinf(turned_rad), 1 - cosf(turned_rad), remainderf(turned_rad, 6.2831853f)};
+}
+
+static bslam_status_t drive_a_step(int64_t time_us)
+{
+    const bslam_odometry_reading_t wheels = {
+        .time_us = time_us, .source = BSLAM_ODOMETRY_WHEELS, .left_m = 0.0109f, .right_m = 0.0132f};
+    const bslam_pose_t at = true_pose(time_us);
+    bslam_sighting_t seen[5];
+    int count = 0;
+    for (int i = 0; i < 5; i++) {
+        const float dx_m = tags[i][0] - at.x_m, dy_m = tags[i][1] - at.y_m;
+        const float bearing_rad = remainderf(atan2f(dy_m, dx_m) - at.theta_rad, 6.2831853f);
+        if (fabsf(bearing_rad) < 0.7f) {  // in the camera's view
+            seen[count++] = (bslam_sighting_t){
+                .label = i, .bearing_rad = bearing_rad, .range_m = hypotf(dx_m, dy_m), .has_range = true};
+        }
+    }
+    const bslam_status_t status = bslam_odometry(&robot, &wheels);
+    return status != BSLAM_OK ? status : bslam_sightings(&robot, time_us, seen, count);
+}
+
+// ---- the map in a file; in flash: bslam_save_to_flash, which a power cut does not harm
+// -----------------------
+
+static bool write_file(void *file, const void *bytes, uint32_t count)
+{
+    return fwrite(bytes, 1, count, file) == count;
+}
+
+static bool read_file(const void *file, uint32_t at, void *bytes, uint32_t count)
+{
+    return fseek((FILE *)file, (long)at, SEEK_SET) == 0 && fread(bytes, 1, count, (FILE *)file) == count;
+}
+
+/// Beside the old map, and in its place once it is whole.
+static bool save(const char *path)
+{
+    char beside[512];
+    uint32_t bytes = 0;
+    snprintf(beside, sizeof beside, "%s.new", path);
+    FILE *file = fopen(beside, "wb");
+    const bslam_map_sink_t sink = {write_file, file};
+    const bool is_written = file != NULL && bslam_save_map(&robot, &sink, &bytes) == BSLAM_OK;
+    const bool is_whole = file != NULL && fclose(file) == 0 && is_written && rename(beside, path) == 0;
+    printf("%s: %s, %d beacons, %u bytes\n", path, is_whole ? "saved" : strerror(errno),
+           (int)bslam_health(&robot).beacons, (unsigned)bytes);
+    return is_whole;
+}
+
+static bool load(FILE *file, const char *path)
+{
+    fseek(file, 0, SEEK_END);
+    const bslam_map_source_t source = {read_file, file, (uint32_t)ftell(file)};
+    bslam_map_fault_t fault = BSLAM_MAP_FINE;
+    const bslam_status_t status = bslam_load_map(&robot, &source, &fault);
+    printf("%s: %s, bslam_map_fault_t %d, %d beacons\n", path, bslam_status_name(status), (int)fault,
+           (int)bslam_health(&robot).beacons);
+    fclose(file);
+    return status == BSLAM_OK;
+}
+
+int main(int argc, char **argv)
+{
+    const char *path = argc > 1 ? argv[1] : "room.bslam";
+    bslam_settings_t settings;
+    int bad_setting;
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
+    settings.wheelbase_m = 0.2f;
+    settings.recovery = 1;  // to notice that the robot is lost, and to find it again
+    if (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
+        printf("setting %s is out of its range\n", bslam_settings_info(bad_setting)->name);
+        return 1;
+    }
+    FILE *file = fopen(path, "rb");
+    const bool has_map = file != NULL;
+    if (has_map && !load(file, path)) {
+        return 1;  // a damaged map is refused as a whole, and the fault says why
+    }
+    const int64_t start_us = has_map ? 7000000 : 0;  // elsewhere on the circle
+    bslam_recovery_state_t before = bslam_health(&robot).state;
+    for (int64_t time_us = start_us + 40000; time_us <= start_us + 30000000; time_us += 40000) {
+        const bslam_status_t status = drive_a_step(time_us);
+        const bslam_recovery_state_t state = bslam_health(&robot).state;
+        if (status != BSLAM_OK) {
+            printf("%s\n", bslam_status_name(status));
+        } else if (state != before) {
+            printf("after %.2f s: found\n", 1e-6 * (double)(time_us - start_us));
+        }
+        before = state;
+    }
+    const bslam_pose_t pose = bslam_pose(&robot), truth = true_pose(start_us + 30000000);
+    printf("at x %.2f m, y %.2f m, %.2f rad; in truth at x %.2f m, y %.2f m, %.2f rad\n", pose.x_m, pose.y_m,
+           pose.theta_rad, truth.x_m, truth.y_m, truth.theta_rad);
+    return save(path) ? 0 : 1;
+}
