@@ -42,10 +42,10 @@ static void open_table(table_t *table, const char *folder, const char *name)
 }
 
 /// A number of the row; `otherwise` where there is no such column, or nothing in it.
-static double value(const table_t *table, const char *name, double otherwise)
+static double value(table_t *table, const char *name, double otherwise)
 {
     const size_t length = strlen(name);
-    const char *title = table->header, *field = table->row;
+    char *title = table->header, *field = table->row, *end;
     for (; strncmp(title, name, length) != 0 || strchr(",\r\n", title[length]) == NULL; title++, field++) {
         title = strchr(title, ',');
         field = strchr(field, ',');
@@ -53,7 +53,6 @@ static double value(const table_t *table, const char *name, double otherwise)
             return otherwise;
         }
     }
-    char *end;
     const double number = strtod(field, &end);
     if (strchr(",\r\n", *end) == NULL) {
         stop(table->path, name, table->row);  // which has no number there

@@ -1,0 +1,102 @@
+"""Watches a robot that drives by itself over the serial link, and tells it what a detector beside it sees.
+
+    my_detector | python live_robot.py serial:/dev/ttyUSB0
+
+The robot runs firmware/robot/main.c: encoders, filter and link are its own. The detector runs here, on a
+companion computer say, and writes a line for each tag: AGE_MS TAG BEARING_MRAD RANGE_MM, left positive.
+For each reading of its encoders the robot reports its pose: TIME_US X_M Y_M HEADING_RAD.
+"""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+from dataclasses import dataclass
+from typing import TextIO
+
+from bslam import CoreError
+from bslam.errors import BslamError
+from bslam.target.lines import TargetError
+from bslam.target.remote import RemoteSlam, connect
+
+# Your robot: docs/TUNING.md says how to find these.
+SETTINGS = {
+    "wheelbase_m": 0.2,
+    "left_radius_m": 0.033,
+    "right_radius_m": 0.033,
+    "ticks_per_revolution": 1440,
+    "counter_bits": 16,
+    "mount_x_m": 0.05,
+}
+BEACONS = 6  # the robot's image must have room for them: BSLAM_BEACONS_MAX
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A tag, so long ago."""
+
+    age_us: int
+    label: int
+    bearing_rad: float
+    range_m: float
+
+
+def read_line(line: str) -> Seen:
+    """Raises ValueError for what is no such line."""
+    age_ms, label, bearing_mrad, range_mm = map(int, line.split())
+    return Seen(1000 * age_ms, label, 1e-3 * bearing_mrad, 1e-3 * range_mm)
+
+
+def listen(detector: TextIO) -> queue.SimpleQueue[Seen | None]:
+    """What the detector says, from a thread of its own: reading a pipe waits. None: it has ended."""
+    told: queue.SimpleQueue[Seen | None] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in detector:
+            try:
+                told.put(read_line(line))
+            except ValueError:
+                print(f"no sighting: {line.rstrip()!r}; allowed: four whole numbers", file=sys.stderr)
+        told.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    return told
+
+
+def follow(robot: RemoteSlam, told: queue.SimpleQueue[Seen | None]) -> None:
+    """Until the detector ends."""
+    now_us: int | None = None  # the robot's clock, as of its last report
+    while True:
+        for one in robot.reports(0.1):
+            now_us = one.time_us
+            x_m, y_m, heading_rad = one.report.step.pose
+            print(f"{now_us} {x_m:.3f} {y_m:.3f} {heading_rad:.3f}", flush=True)
+        while now_us is not None and not told.empty():
+            seen = told.get()
+            if seen is None:
+                return
+            try:
+                robot.sightings(
+                    now_us - seen.age_us, [seen.bearing_rad], [seen.range_m], [seen.label], [True]
+                )
+            except CoreError as refusal:  # too old, impossible: the robot is then as it was
+                print(refusal, file=sys.stderr)
+
+
+def main(target: str) -> int:
+    """The exit status."""
+    try:
+        with connect(target, SETTINGS, BEACONS) as robot:
+            follow(robot, listen(sys.stdin))
+            robot.update()
+            for beacon in robot.beacons():
+                print(f"tag {beacon.label}: x {beacon.x_m:.3f} m, y {beacon.y_m:.3f} m", flush=True)
+    except (BslamError, TargetError) as error:
+        print(f"live_robot: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
