@@ -1,4 +1,4 @@
-"""A room with AprilTags on its walls, and a drive through it with a camera: what examples/camera_tags reads."""
+"""A room with AprilTags on its walls, and a drive through it with a camera, for examples/camera_tags."""
 
 import math
 from pathlib import Path
@@ -52,7 +52,9 @@ def picture(pose: Pose) -> NDArray[np.uint8]:
         module_px = 24
         marker = cv2.aruco.generateImageMarker(family, number, 8 * module_px)
         marker = cv2.copyMakeBorder(marker, *[module_px] * 4, cv2.BORDER_CONSTANT, value=255)
-        last = MODULES * module_px - 0.5  # a picture's corner is half a pixel beyond the middle of its last one
+        last = (
+            MODULES * module_px - 0.5
+        )  # a picture's corner is half a pixel beyond the middle of its last one
         flat = np.array([[-0.5, -0.5], [last, -0.5], [last, last], [-0.5, last]], np.float32)
         fine = ((corners_px + 0.5) * FINER - 0.5).astype(np.float32)
         mapping = cv2.getPerspectiveTransform(flat, fine)
@@ -62,7 +64,7 @@ def picture(pose: Pose) -> NDArray[np.uint8]:
 
 
 def _corners_px(pose: Pose, x_m: float, y_m: float, facing_rad: float) -> NDArray[np.float64] | None:
-    """Of a tag with its margin, from the upper left one clockwise; None: it is behind, or seen from behind."""
+    """Of a tag with its margin, from the upper left one clockwise; None: it cannot be seen."""
     half_m = TAG_M / 8 * MODULES / 2
     left_x, left_y = math.sin(facing_rad), -math.cos(facing_rad)  # to the left of who looks at the tag
     camera_x, camera_y = pose[0] + MOUNT_X_M * math.cos(pose[2]), pose[1] + MOUNT_X_M * math.sin(pose[2])
@@ -82,11 +84,12 @@ def _corners_px(pose: Pose, x_m: float, y_m: float, facing_rad: float) -> NDArra
 
 
 def write_drive(folder: Path, seed: int) -> None:
-    """odometry.csv of wheels that err by 0.05 m/s at each step and of which the left one slips; the pictures."""
+    """Pictures, and odometry of wheels that err by 0.05 m/s at each step and of which the left one slips."""
     rng = np.random.default_rng(seed)
     (folder / "pictures").mkdir(parents=True)
     (folder / "camera.toml").write_text(
-        f"fx_px = {FOCAL_PX}\nfy_px = {FOCAL_PX}\ncx_px = {WIDTH_PX / 2 - 0.5}\ncy_px = {HEIGHT_PX / 2 - 0.5}\n"
+        f"fx_px = {FOCAL_PX}\nfy_px = {FOCAL_PX}\ncx_px = {WIDTH_PX / 2 - 0.5}\n"
+        f"cy_px = {HEIGHT_PX / 2 - 0.5}\n"
         f"distortion = [0.0, 0.0, 0.0, 0.0, 0.0]\nmount_x_m = {MOUNT_X_M}\nmount_y_m = 0.0\n"
         f"mount_yaw_rad = 0.0\ntag_m = {TAG_M}\nwheelbase_m = {WHEELBASE_M}\n",
         encoding="utf-8",
