@@ -26,7 +26,7 @@ GOING, STANDING, TICKS = (
 LOOKING = range(GOING + 5, GOING + 15)
 M_PER_TICK, WHEELBASE_M, MOUNT_X_M = 2 * math.pi * 0.033 / 1440, 0.2, 0.05  # as the example has them
 SLIP = 0.95  # of the left wheel: odometry alone goes wrong
-TAGS = {1: (2.5, 0.5), 2: (1.0, 2.5), 3: (-2.0, 1.5), 4: (-1.0, -1.5)}
+TAGS = {1: (3.0, 0.2), 2: (2.5, 2.0), 3: (1.5, 3.0), 4: (0.3, 3.2)}
 
 
 def phase(time_us):
@@ -50,7 +50,7 @@ def lines_of(pose):
         dx = tag_x - x_m - MOUNT_X_M * math.cos(heading_rad)
         dy = tag_y - y_m - MOUNT_X_M * math.sin(heading_rad)
         bearing_rad = math.remainder(math.atan2(dy, dx) - heading_rad, 2 * math.pi)
-        if abs(bearing_rad) < 1.0:
+        if abs(bearing_rad) < 1.5:
             yield f"0 {tag} {round(1e3 * bearing_rad)} {round(1e3 * math.hypot(dx, dy))}\n"
 
 
