@@ -1,0 +1,10 @@
+# find_package(bslam CONFIG COMPONENTS bslam vision link): all of them are there, whichever are asked for.
+include("${CMAKE_CURRENT_LIST_DIR}/bslamTargets.cmake")
+foreach(component ${bslam_FIND_COMPONENTS})
+    if(TARGET bslam::${component})
+        set(bslam_${component}_FOUND TRUE)
+    elseif(bslam_FIND_REQUIRED_${component})
+        set(bslam_FOUND FALSE)
+        set(bslam_NOT_FOUND_MESSAGE "bslam has no component '${component}'; allowed: bslam, vision, link")
+    endif()
+endforeach()
