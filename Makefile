@@ -22,6 +22,7 @@ include mk/fuzz.mk
 include mk/mcdc.mk
 include mk/soak.mk
 include mk/mutants.mk
+include mk/packages.mk
 
 .PHONY: help
 help: ## list the targets

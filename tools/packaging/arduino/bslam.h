@@ -1,0 +1,2 @@
+/// The estimator. Arduino looks for headers here, and in no folder below.
+#include "bslam/bslam.h"

@@ -1,0 +1,2 @@
+/// Frames of the serial link.
+#include "link/parser.h"

@@ -1,0 +1,2 @@
+/// Images to sightings.
+#include "vision/vision.h"
