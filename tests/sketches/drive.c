@@ -1,7 +1,7 @@
 // Drives a robot among beacons that have no names, with noise and a
 // kidnapping, and prints the fingerprint of every state: two builds of one library print the same.
 //
-//   drive 1|2|4|5 0|1     association, filter
+//   drive [ASSOCIATION [FILTER]]     as numbers
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -45,8 +45,8 @@ int main(int argc, char **argv)
     int bad_setting = -1;
     bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     settings.wheelbase_m = BSLAM_R(0.3);
-    settings.association = argc > 1 ? atoi(argv[1]) : 0;
-    settings.filter = argc > 2 ? atoi(argv[2]) : 0;
+    settings.association = argc > 1 ? atoi(argv[1]) : BSLAM_ASSOCIATION_POSITION;
+    settings.filter = argc > 2 ? atoi(argv[2]) : BSLAM_FILTER_INVARIANT;
     settings.recovery = 1;
     if (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
         printf("%s\n", bslam_settings_info(bad_setting)->name);

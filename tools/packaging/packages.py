@@ -1,7 +1,8 @@
 """Writes the C library's packages: archives for Arduino, PlatformIO and ESP-IDF, and the amalgamation.
 
-Of files that git tracks; the same files give the same bytes. Exit status 0: written. 2: something is missing or
-the versions differ; what was there stays as it is.
+Of files that git tracks; the same files give the same bytes.
+
+Exit status 0: written. 2: something is missing, or versions differ; what was there stays as it is.
 """
 
 import argparse
@@ -63,10 +64,7 @@ def examples(root: Path, name: str) -> Files:
 
 def arduino(root: Path) -> Files:
     """A library in Arduino's layout: sources below src, and there the headers that it looks for."""
-    own = read(root, ARDUINO)
-    properties = own.pop(f"{ARDUINO}/library.properties")
-    files = {"library.properties": properties, "LICENSE": (root / "LICENSE").read_bytes()}
-    files |= below(own, ARDUINO, "src")
+    files = below(read(root, ARDUINO), f"{ARDUINO}/", "") | read(root, "LICENSE")
     files |= with_flat_names(below(read(root, *FOLDERS), "firmware", "src"))
     files |= below(examples(root, "arduino"), "examples/arduino", "examples")
     return {f"bslam/{name}": text for name, text in files.items()}
