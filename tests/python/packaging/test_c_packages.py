@@ -145,8 +145,6 @@ def test_platformio_manifest_names_what_the_package_holds(platformio: Path) -> N
     assert {
         path.name for path in [*platformio.iterdir(), *(platformio / "firmware").iterdir()]
     } == exported | {"firmware"}
-    # It packs objects into an archive by their names alone, unless it is told not to; two are called frame.
-    assert build["libArchive"] is False
 
 
 # ---- ESP-IDF and Zephyr: their functions, as far as they are called ----------------------------------------
