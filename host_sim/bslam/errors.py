@@ -1,4 +1,7 @@
-"""The one exception a user sees."""
+"""The one exception a user sees, and the nearest name for a misspelt one."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class BslamError(Exception):
@@ -6,3 +9,17 @@ class BslamError(Exception):
 
     The command line prints the message as the last line on stderr and exits with status 2.
     """
+
+
+def did_you_mean(word: str, allowed: Iterable[str]) -> str:
+    """What to append to a message about `word`: "; did you mean 'NAME'?" with the nearest allowed name.
+
+    "" where none is near. Case and "-" for "_" count as no difference.
+    """
+    by_plain_name = {_plain(name): name for name in allowed}
+    nearest = get_close_matches(_plain(word), by_plain_name, n=1)
+    return f"; did you mean {by_plain_name[nearest[0]]!r}?" if nearest else ""
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("-", "_")
