@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+import bslam  # the front door, whose check and run are methods of a log, too
 from bslam.errors import BslamError
-from bslam.parsing.csvtable import Column, Table, is_count, read_table
+from bslam.parsing.csvtable import Column, Table, is_count, read_table, table_of_texts
 from bslam.parsing.identities import BEACON_ID, IDENTITY, read_identities
 from bslam.parsing.settings import (
     FIELD_OF_VIEW,
@@ -30,6 +31,9 @@ from bslam.parsing.settings import (
     parse_table,
     setting,
 )
+
+if TYPE_CHECKING:
+    from narwhals.typing import IntoFrame
 
 ODOMETRY_COLUMNS = {
     "wheels": ("left_m", "right_m"),
@@ -181,7 +185,10 @@ class Robot:
 
 @dataclass(frozen=True)
 class Log:
-    """One drive. `truth` and `beacons` (the true map) are there only if somebody knows them."""
+    """One drive. `truth` and `beacons` (the true map) are there only if somebody knows them.
+
+    From a folder (`Log.read`), from tables (`Log.from_dataframe`), or from arrays.
+    """
 
     name: str
     odometry: Odometry
@@ -199,43 +206,103 @@ class Log:
         """The identity as the log has it; none: empty."""
         return "" if number < 0 else self.words[number] if number < len(self.words) else str(number)
 
+    @classmethod
+    def read(cls, path: str | Path) -> Log:
+        """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`,
+        `beacons.csv`, `signatures.npy`, `seeds.npy`), see docs/LOG-FORMAT.md.
 
-def read_folder(path: str | Path) -> Log:
-    """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`, `beacons.csv`,
-    `signatures.npy`, `seeds.npy`).
+        Each .csv may be a .csv.gz. Raises BslamError that names the file, the line and column or key, the
+        value and what is allowed there.
+        """
+        folder = Path(path)
+        if not folder.is_dir():
+            needs = "a log is a folder with odometry.csv, sightings.csv, robot.toml"
+            raise BslamError(f"{folder}: no such folder; {needs}")
+        robot, seeds = _read_robot(folder / "robot.toml"), folder / SEEDS
+        log = _log_of(folder.resolve().name, _tables_in(folder), robot, folder / SIGNATURES)
+        return replace(log, seeds=_read_seeds(seeds))
 
-    Each .csv may be a .csv.gz. Raises BslamError that names the file, the line and column or key, the value
-    and what is allowed there.
-    """
-    folder = Path(path)
-    if not folder.is_dir():
-        raise BslamError(
-            f"{folder}: no such folder; a log is a folder with odometry.csv, sightings.csv, robot.toml"
-        )
-    robot, notes = _read_robot(folder / "robot.toml"), list[str]()
-    odometry = _read_odometry(folder, robot, notes)
-    seen, signature = _sightings_table(folder, notes)
-    placed = _beacons_table(folder, notes)
-    identities = read_identities(seen, placed)
-    return Log(
-        name=folder.resolve().name,
-        odometry=odometry,
-        sightings=_sightings(seen, identities.numbers(seen), signature),
-        truth=_read_truth(folder, notes),
-        beacons=None if placed is None else _beacons(placed, identities.numbers(placed)),
-        robot=robot,
-        seeds=_read_seeds(folder / SEEDS),
-        words=identities.words,
-        notes=tuple(notes),
+    def write(self, path: str | Path) -> None:
+        """Write the log as a folder that `read` reads back to the last bit; files there are replaced.
+
+        Raises BslamError if the folder cannot be written.
+        """
+        _write(self, Path(path))
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        odometry: IntoFrame,
+        sightings: IntoFrame,
+        *,
+        robot: Robot | Mapping[str, Any] | str | Path,
+        truth: IntoFrame | None = None,
+        beacons: IntoFrame | None = None,
+        name: str = "log",
+    ) -> Log:
+        """A log from dataframes of pandas, polars, pyarrow or another library that narwhals knows.
+
+        Columns, units and rules are those of the files (docs/LOG-FORMAT.md); rows in order of time, an index
+        counts for nothing, a missing value (None, NaN) is an empty field.
+
+        odometry: time_us, and left_m, right_m (m since the row before), or left_ticks, right_ticks, or v_mps,
+        omega_radps; perhaps gyro_radps. sightings: time_us (us), bearing_rad (left positive), and what is
+        known of beacon_id, range_m (m), mappable, ... truth: time_us, x_m, y_m, perhaps theta_rad. beacons:
+        beacon_id, x_m, y_m. robot: geometry and noise, whose wheelbase nobody can guess: a `Robot`, a mapping
+        with its keys, or the path of a robot.toml.
+
+        Raises BslamError that names table, row (from 0) and column, the value and what is allowed there.
+        """
+        frames = {"odometry": odometry, "sightings": sightings, "truth": truth, "beacons": beacons}
+        return _log_of(name, _tables_of(frames), _robot_of(robot))
+
+    def check(self) -> bslam.Report:
+        """What `bslam check` says of the log: signs, units, delay, scales, noise, identities, stamps.
+
+        It prints as the command does; `findings` are the parts.
+        """
+        return bslam.check(self)
+
+    def run(self, **words: Unpack[bslam.RunWords]) -> bslam.Run:
+        """Run the filter over the log, as `bslam replay csv` does with options of these names.
+
+        Raises BslamError for what is no option, or no value of one.
+        """
+        return bslam.run(self, **words)
+
+
+def first_steps(log: Log, steps: int) -> Log:
+    """The beginning of a log: so many rows of odometry, and the sightings until the last of them."""
+    kept = slice(0, steps)
+    odometry = replace(
+        log.odometry,
+        time_us=log.odometry.time_us[kept],
+        a=log.odometry.a[kept],
+        b=log.odometry.b[kept],
+        gyro_radps=None if log.odometry.gyro_radps is None else log.odometry.gyro_radps[kept],
+        gyro_sd_radps=None if log.odometry.gyro_sd_radps is None else log.odometry.gyro_sd_radps[kept],
     )
+    seen = log.sightings.time_us <= odometry.time_us[-1]
+    columns = {one.name: getattr(log.sightings, one.name) for one in fields(log.sightings)}
+    cut: Any = {name: None if column is None else column[seen] for name, column in columns.items()}
+    return replace(log, odometry=odometry, sightings=replace(log.sightings, **cut))
 
 
-def write_folder(log: Log, path: str | Path) -> None:
-    """Write the log as a folder that `read_folder` reads back to the last bit; files there are replaced.
+def has_identities(log: Log) -> bool:
+    """Whether somebody says of at least one sighting whose it is."""
+    return bool((log.sightings.beacon_id >= 0).any())
 
-    Raises BslamError if the folder cannot be written.
-    """
-    folder = Path(path)
+
+def wrap_rad(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same angles in (-pi, pi]; those already there are kept to the last bit."""
+    outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
+    return np.where(outside, math.pi - np.mod(math.pi - angle_rad, 2.0 * math.pi), angle_rad)
+
+
+# --- writing ------------------------------------------------------------------------------------------------
+
+
+def _write(log: Log, folder: Path) -> None:
     odometry, sightings = log.odometry, log.sightings
     number = int if odometry.kind == "ticks" else float
     a_name, b_name = ODOMETRY_COLUMNS[odometry.kind]
@@ -268,37 +335,6 @@ def write_folder(log: Log, path: str | Path) -> None:
         (folder / "robot.toml").write_text(robot_text(log.robot), encoding="utf-8")
     except OSError as error:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
-
-
-def first_steps(log: Log, steps: int) -> Log:
-    """The beginning of a log: so many rows of odometry, and the sightings until the last of them."""
-    kept = slice(0, steps)
-    odometry = replace(
-        log.odometry,
-        time_us=log.odometry.time_us[kept],
-        a=log.odometry.a[kept],
-        b=log.odometry.b[kept],
-        gyro_radps=None if log.odometry.gyro_radps is None else log.odometry.gyro_radps[kept],
-        gyro_sd_radps=None if log.odometry.gyro_sd_radps is None else log.odometry.gyro_sd_radps[kept],
-    )
-    seen = log.sightings.time_us <= odometry.time_us[-1]
-    columns = {one.name: getattr(log.sightings, one.name) for one in fields(log.sightings)}
-    cut: Any = {name: None if column is None else column[seen] for name, column in columns.items()}
-    return replace(log, odometry=odometry, sightings=replace(log.sightings, **cut))
-
-
-def has_identities(log: Log) -> bool:
-    """Whether somebody says of at least one sighting whose it is."""
-    return bool((log.sightings.beacon_id >= 0).any())
-
-
-def wrap_rad(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same angles in (-pi, pi]; those already there are kept to the last bit."""
-    outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
-    return np.where(outside, math.pi - np.mod(math.pi - angle_rad, 2.0 * math.pi), angle_rad)
-
-
-# --- writing ------------------------------------------------------------------------------------------------
 
 
 def _texts(values: NDArray[Any], kind: Callable[[Any], Any]) -> list[str]:
@@ -364,10 +400,11 @@ _FARTHEST = 1e6
 _LARGEST_FEATURE = 1e12  # as the core has it
 
 _NO_RANGE_ALONE = "a sighting of range alone cannot be used"
-_COUNT = Column("an integer from 0", is_count)
+_COUNT = Column("an integer from 0 to 2^53", is_count)
+_TIME = Column("an integer from 0 to 2^53, in microseconds", is_count)
 _NUMBER = Column("a number from -1e6 to 1e6", lambda values: np.abs(values) <= _FARTHEST)
 _COLUMNS = {
-    "time_us": _COUNT,
+    "time_us": _TIME,
     "left_m": _NUMBER,
     "right_m": _NUMBER,
     "left_ticks": _COUNT,
@@ -406,20 +443,71 @@ def _find_csv(folder: Path, stem: str) -> Path | None:
     return found[0] if found else None
 
 
-def _require_csv(folder: Path, stem: str) -> Path:
-    path = _find_csv(folder, stem)
-    if path is None:
-        raise BslamError(f"{folder}: {stem}.csv is missing; a log needs {stem}.csv or {stem}.csv.gz")
-    return path
+Tables = Callable[[str, Sequence[Mapping[str, Column]], Mapping[str, Column]], Table | None]
+"""Gives the table of a name with the columns of one of some layouts, and perhaps others; None: not there."""
+
+
+def _tables_in(folder: Path) -> Tables:
+    """Of a log folder."""
+
+    def read(
+        stem: str, layouts: Sequence[Mapping[str, Column]], optional: Mapping[str, Column]
+    ) -> Table | None:
+        path = _find_csv(folder, stem)
+        if path is None and stem in _NEEDED:
+            raise BslamError(f"{folder}: {stem}.csv is missing; a log needs {stem}.csv or {stem}.csv.gz")
+        return None if path is None else read_table(path, layouts, optional)
+
+    return read
+
+
+def _tables_of(frames: Mapping[str, Any]) -> Tables:
+    """Of dataframes by name."""
+    from bslam.parsing.frames import texts_of  # narwhals is wanted here alone
+
+    def read(
+        stem: str, layouts: Sequence[Mapping[str, Column]], optional: Mapping[str, Column]
+    ) -> Table | None:
+        frame = frames[stem]
+        if frame is None and stem not in _NEEDED:
+            return None
+        return table_of_texts(stem, texts_of(stem, frame), layouts, optional)
+
+    return read
+
+
+def _log_of(name: str, tables: Tables, robot: Robot, signatures: Path | None = None) -> Log:
+    """The log of these tables. signatures: the file that holds them, if it is there."""
+    notes: list[str] = []
+    odometry = _odometry(tables, robot, notes)
+    seen, signature = _sightings_table(tables, signatures, notes)
+    placed = _beacons_table(tables, notes)
+    identities = read_identities(seen, placed)
+    truth = tables("truth", [_TRUTH], _columns("theta_rad"))
+    return Log(
+        name=name,
+        odometry=odometry,
+        sightings=_sightings(seen, identities.numbers(seen), signature),
+        truth=None if truth is None else _truth(truth, notes),
+        beacons=None if placed is None else _beacons(placed, identities.numbers(placed)),
+        robot=robot,
+        words=identities.words,
+        notes=tuple(notes),
+    )
 
 
 def _columns(*names: str) -> dict[str, Column]:
     return {name: _COLUMNS[name] for name in names}
 
 
-def _read_odometry(folder: Path, robot: Robot, notes: list[str]) -> Odometry:
+_NEEDED = ("odometry", "sightings")
+_TRUTH = _columns("time_us", "x_m", "y_m")
+
+
+def _odometry(tables: Tables, robot: Robot, notes: list[str]) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
-    table = read_table(_require_csv(folder, "odometry"), layouts, _columns(GYRO, GYRO_SD))
+    table = tables("odometry", layouts, _columns(GYRO, GYRO_SD))
+    assert table is not None
     table.require_rows("allowed: at least one")
     table = _in_order(table, notes, strict=True)
     kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
@@ -441,7 +529,7 @@ def _in_order(table: Table, notes: list[str], *, strict: bool) -> Table:
 def _require_tick_range(table: Table, robot: Robot) -> None:
     if robot.counter_bits is None:
         raise BslamError(
-            f"{table.path}: ticks need {', '.join(TICK_KEYS)} in robot.toml; allowed: all four there"
+            f"{table.origin.name}: ticks need {', '.join(TICK_KEYS)} in robot.toml; allowed: all four there"
         )
     highest = 2**robot.counter_bits - 1
     for name in ODOMETRY_COLUMNS["ticks"]:
@@ -451,11 +539,14 @@ def _require_tick_range(table: Table, robot: Robot) -> None:
         )
 
 
-def _sightings_table(folder: Path, notes: list[str]) -> tuple[Table, NDArray[np.float32] | None]:
-    """The rows of sightings.csv in order, and their signatures."""
+def _sightings_table(
+    tables: Tables, signatures: Path | None, notes: list[str]
+) -> tuple[Table, NDArray[np.float32] | None]:
+    """The rows of sightings in order, and their signatures."""
     optional = _columns(BEACON_ID, "range_m", "mappable", *SIGHTING_NUMBERS, CLASS)
-    table = read_table(_require_csv(folder, "sightings"), [_columns("time_us", "bearing_rad")], optional)
-    signature = _read_signatures(folder / SIGNATURES, table.rows)
+    table = tables("sightings", [_columns("time_us", "bearing_rad")], optional)
+    assert table is not None
+    signature = None if signatures is None else _read_signatures(signatures, table.rows)
     kept = table.unrepeated(notes) if signature is None else np.ones(table.rows, dtype=np.bool_)
     kept &= table.begun("time_us", notes)
     table = table.only(kept)
@@ -514,29 +605,24 @@ def _read_looks(path: Path, allowed: str) -> NDArray[np.float32] | None:
     return values
 
 
-def _read_truth(folder: Path, notes: list[str]) -> Truth | None:
-    path = _find_csv(folder, "truth")
-    return None if path is None else read_truth(path, notes)
-
-
 def read_truth(path: Path, notes: list[str]) -> Truth:
     """True poses from a truth.csv or .csv.gz; what is left out goes into the notes.
 
     Raises BslamError that names the line and what is allowed.
     """
-    table = read_table(path, [_columns("time_us", "x_m", "y_m")], _columns("theta_rad"))
+    return _truth(read_table(path, [_TRUTH], _columns("theta_rad")), notes)
+
+
+def _truth(table: Table, notes: list[str]) -> Truth:
     table.require_rows("allowed: at least one, or no such file")
     table = _in_order(table, notes, strict=True)
     theta_rad = table.values.get("theta_rad", np.full(table.rows, math.nan))
     return Truth(table.integers("time_us"), table.values["x_m"], table.values["y_m"], wrap_rad(theta_rad))
 
 
-def _beacons_table(folder: Path, notes: list[str]) -> Table | None:
-    path = _find_csv(folder, "beacons")
-    if path is None:
-        return None
-    table = read_table(path, [_columns(BEACON_ID, "x_m", "y_m")])
-    return table.only(table.unrepeated(notes))
+def _beacons_table(tables: Tables, notes: list[str]) -> Table | None:
+    table = tables("beacons", [_columns(BEACON_ID, "x_m", "y_m")], {})
+    return None if table is None else table.only(table.unrepeated(notes))
 
 
 def _beacons(table: Table, beacon_id: NDArray[np.int64]) -> Beacons:
@@ -548,11 +634,27 @@ def _beacons(table: Table, beacon_id: NDArray[np.int64]) -> Beacons:
 def _read_robot(path: Path) -> Robot:
     if not path.is_file():
         raise BslamError(f"{path.parent}: robot.toml is missing; a log needs it (geometry and noise)")
-    robot = parse_table(Robot, load_toml(path), str(path))
+    return _checked_robot(load_toml(path), str(path))
+
+
+def _robot_of(robot: Robot | Mapping[str, Any] | str | Path) -> Robot:
+    """What `Log.from_dataframe` takes for one."""
+    if isinstance(robot, Robot):
+        told = {key: value for key, value in vars(robot).items() if value is not None}
+        return _robot_of(told | {"settings": dict(robot.settings)})
+    if isinstance(robot, Mapping):
+        return _checked_robot(robot, "robot")
+    if isinstance(robot, (str, Path)):
+        return _checked_robot(load_toml(Path(robot)), str(robot))
+    raise BslamError(f"robot {robot!r}: allowed: a Robot, a mapping of its keys, the path of a robot.toml")
+
+
+def _checked_robot(table: Mapping[str, object], where: str) -> Robot:
+    robot = parse_table(Robot, table, where)
     encoder = {key: getattr(robot, key) for key in TICK_KEYS}
     missing = [key for key, value in encoder.items() if value is None]
     if missing and len(missing) < len(encoder):
         raise BslamError(
-            f"{path}, key {missing[0]}: is missing; allowed: all of {', '.join(encoder)}, or none"
+            f"{where}, key {missing[0]}: is missing; allowed: all of {', '.join(encoder)}, or none"
         )
     return robot

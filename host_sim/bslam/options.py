@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from bslam.core.presets import preset_settings
-from bslam.errors import BslamError
-from bslam.log import Log, Robot
+from bslam.core.presets import PRESETS, preset_settings
+from bslam.errors import BslamError, did_you_mean
+from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS, Log, Robot
+from bslam.parsing.settings import SHARE, Rule, integer
 
 OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = (
@@ -44,7 +46,7 @@ Number = int | float
 
 @dataclass(frozen=True)
 class RunOptions:
-    """One way of running the filter over a log."""
+    """One way of running the filter over a log. BslamError for a word or number that is not allowed."""
 
     observation: str = "distance"
     association: str = "known"
@@ -70,6 +72,18 @@ class RunOptions:
     map_align: str | None = None  # the same of the map, where `align` is not said; None: as the estimate
     parameters: tuple[tuple[str, Number], ...] = ()  # --params and --set: they win over all else
 
+    def __post_init__(self) -> None:
+        for name, allowed in _WORDS.items():
+            value = getattr(self, name)
+            if value is not None:
+                ensure_word(name, value, allowed)
+        for name, rule in _RULES.items():
+            value = getattr(self, name)
+            if value is not None:
+                rule.convert(value, name)
+        for preset in self.presets:
+            ensure_word("preset", preset, PRESETS)
+
     @property
     def association_name(self) -> str:
         """As on the command line: "known", "known:0.05", "nearest", ..."""
@@ -78,12 +92,42 @@ class RunOptions:
         return self.association
 
 
+_WORDS = {
+    "observation": OBSERVATIONS,
+    "association": ASSOCIATIONS,
+    "filter": FILTERS,
+    "motion": MOTIONS,
+    "noise": WHEEL_NOISES,
+    "sensor": (*SENSORS, "recorded"),
+    "real": REALS,
+    "recovery": RECOVERIES,
+    "align": ALIGNMENTS,
+    "map_align": ALIGNMENTS,
+}
+"""Options that are words, and which ones."""
+_RULES = {
+    "wrong_identity_rate": SHARE,
+    "sigma_mps": WHEEL_SPEED_SIGMA_MPS,
+    "seed": integer(0),
+    "presets": Rule("a tuple of names", tuple),
+    **dict.fromkeys(("velocity_states", "known_map", "frozen"), Rule("True or False", bool)),
+}
+
+
+def ensure_word(what: str, word: object, allowed: Iterable[str]) -> None:
+    """Raise BslamError, with the nearest one, for a word that is none of these."""
+    names = tuple(allowed)
+    if word not in names:
+        near = did_you_mean(word, names) if isinstance(word, str) else ""
+        raise BslamError(f"{what} {word!r} does not exist; allowed: {', '.join(names)}{near}")
+
+
 def parse_association(text: str) -> tuple[str, float]:
     """ "known:0.05" -> ("known", 0.05). Raises BslamError for what is not allowed."""
     name, colon, rate_text = text.partition(":")
     allowed = f"allowed: known, known:RATE with RATE from 0 to 1, {', '.join(ASSOCIATIONS[1:])}"
     if name not in ASSOCIATIONS or (colon and name != "known"):
-        raise BslamError(f"association '{text}' does not exist; {allowed}")
+        raise BslamError(f"association '{text}' does not exist; {allowed}{did_you_mean(name, ASSOCIATIONS)}")
     if not colon:
         return name, 0.0
     try:
@@ -95,9 +139,9 @@ def parse_association(text: str) -> tuple[str, float]:
     return name, rate
 
 
-def usual_filter(observation: str) -> str:
-    """What estimates, unless asked otherwise, in a map that is made on the way."""
-    return "smoother" if observation == "direction" else "invariant"
+def usual_filter(observation: str, has_map: bool = False) -> str:
+    """What estimates, unless asked otherwise. has_map: there is one before the drive."""
+    return "smoother" if observation == "direction" and not has_map else "invariant"
 
 
 def wheel_noise(options: RunOptions, log: Log) -> str:

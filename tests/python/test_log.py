@@ -24,9 +24,7 @@ from bslam.log import (
     Truth,
     first_steps,
     has_identities,
-    read_folder,
     wrap_rad,
-    write_folder,
 )
 
 ROBOT = Robot(
@@ -109,8 +107,8 @@ def write_files(folder: Path, **changed: str | None) -> Path:
 @pytest.mark.parametrize("kind", ["wheels", "velocity", "ticks"])
 def test_write_then_read_gives_the_same_log(tmp_path: Path, kind: str) -> None:
     log = a_log(kind=kind, robot=replace(ROBOT, **ENCODERS) if kind == "ticks" else ROBOT)
-    write_folder(log, tmp_path / "a_log")
-    read = read_folder(tmp_path / "a_log")
+    log.write(tmp_path / "a_log")
+    read = Log.read(tmp_path / "a_log")
     assert read.name == "a_log"
     assert_same_log(log, read)
 
@@ -119,9 +117,9 @@ def test_write_then_read_without_truth_map_and_ranges_gives_the_same_log(tmp_pat
     log = a_log()
     no_range = replace(log.sightings, range_m=np.full(3, math.nan), mappable=np.ones(3, dtype=np.bool_))
     log = replace(log, truth=None, beacons=None, sightings=no_range)
-    write_folder(log, tmp_path)
+    log.write(tmp_path)
     assert (tmp_path / "sightings.csv").read_text().startswith("time_us,beacon_id,bearing_rad\n")
-    assert_same_log(log, read_folder(tmp_path))
+    assert_same_log(log, Log.read(tmp_path))
 
 
 def test_write_then_read_keeps_the_noise_and_the_score_that_the_detector_gives(tmp_path: Path) -> None:
@@ -129,19 +127,19 @@ def test_write_then_read_keeps_the_noise_and_the_score_that_the_detector_gives(t
     values = ([0.01, 0.0, 0.02], [0.1, 0.0, 1.0 / 3.0], [0.07, 0.0, 1.0], [1.3, 0.0, -0.1])
     noise = {name: np.array(column) for name, column in zip(SIGHTING_NUMBERS, values, strict=True)}
     log = replace(log, sightings=replace(log.sightings, **noise))
-    write_folder(log, tmp_path)
-    assert_same_log(log, read_folder(tmp_path))
+    log.write(tmp_path)
+    assert_same_log(log, Log.read(tmp_path))
 
 
 def test_write_then_read_keeps_the_gyro_and_where_it_said_nothing(tmp_path: Path) -> None:
     log = a_log()
     log = replace(log, odometry=replace(log.odometry, gyro_radps=np.array([1.0 / 3.0, math.nan])))
-    write_folder(log, tmp_path)
-    assert_same_log(log, read_folder(tmp_path))
+    log.write(tmp_path)
+    assert_same_log(log, Log.read(tmp_path))
     assert first_steps(log, 1).odometry.gyro_radps == pytest.approx([1.0 / 3.0])
     log = replace(log, odometry=replace(log.odometry, gyro_sd_radps=np.array([0.125, 0.0])))
-    write_folder(log, tmp_path)
-    assert_same_log(log, read_folder(tmp_path))
+    log.write(tmp_path)
+    assert_same_log(log, Log.read(tmp_path))
     assert first_steps(log, 1).odometry.gyro_sd_radps == pytest.approx([0.125])
 
 
@@ -179,14 +177,14 @@ def test_write_then_read_keeps_every_bit(tmp_path_factory: pytest.TempPathFactor
         beacons=None,
         robot=ROBOT,
     )
-    write_folder(log, folder)
-    assert_same_log(log, read_folder(folder))
+    log.write(folder)
+    assert_same_log(log, Log.read(folder))
 
 
 def test_write_replaces_what_was_there(tmp_path: Path) -> None:
     for name in ("odometry.csv.gz", "truth.csv.gz", "truth.csv"):
         (tmp_path / name).write_text("old")
-    write_folder(replace(a_log(), truth=None), tmp_path)
+    replace(a_log(), truth=None).write(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "beacons.csv",
         "odometry.csv",
@@ -198,20 +196,20 @@ def test_write_replaces_what_was_there(tmp_path: Path) -> None:
 def test_write_to_a_place_that_is_a_file_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(BslamError, match="cannot write the log there"):
-        write_folder(a_log(), tmp_path / "file")
+        a_log().write(tmp_path / "file")
 
 
 def test_read_takes_gzip_any_column_order_crlf_and_a_byte_order_mark(tmp_path: Path) -> None:
     write_files(tmp_path, odometry_csv=None)
     text = "\ufeffright_m,time_us,left_m\r\n0.02,40000,0.01\r\n"
     (tmp_path / "odometry.csv.gz").write_bytes(gzip.compress(text.encode()))
-    odometry = read_folder(tmp_path).odometry
+    odometry = Log.read(tmp_path).odometry
     assert (odometry.kind, odometry.time_us.tolist()) == ("wheels", [40_000])
     assert (odometry.a.tolist(), odometry.b.tolist()) == ([0.01], [0.02])
 
 
 def test_read_takes_an_empty_identity_and_range(tmp_path: Path) -> None:
-    sightings = read_folder(write_files(tmp_path)).sightings
+    sightings = Log.read(write_files(tmp_path)).sightings
     assert sightings.beacon_id.tolist() == [3, -1, 4]
     np.testing.assert_array_equal(sightings.range_m, [2.5, math.nan, 3.0])
     assert sightings.mappable.all()
@@ -219,7 +217,7 @@ def test_read_takes_an_empty_identity_and_range(tmp_path: Path) -> None:
 
 def test_read_wraps_angles(tmp_path: Path) -> None:
     truth_csv = "time_us,x_m,y_m,theta_rad\n0,0,0,7\n"
-    truth = read_folder(write_files(tmp_path, truth_csv=truth_csv)).truth
+    truth = Log.read(write_files(tmp_path, truth_csv=truth_csv)).truth
     assert truth is not None
     assert truth.theta_rad.tolist() == pytest.approx([7.0 - 2.0 * math.pi])
 
@@ -232,7 +230,7 @@ def test_rows_that_a_logger_wrote_twice_are_left_out_and_noted(tmp_path: Path) -
         truth_csv="time_us,x_m,y_m\n0,0,0\n0,0,0\n9,1,1\n",
         beacons_csv="beacon_id,x_m,y_m\n3,1,2\n4,1,2\n3,1,2\n",
     )
-    log = read_folder(tmp_path)
+    log = Log.read(tmp_path)
     assert log.odometry.time_us.tolist() == [40_000, 80_000]
     assert log.sightings.beacon_id.tolist() == [3, 4, 3]
     assert log.truth is not None and log.truth.x_m.tolist() == [0.0, 1.0]
@@ -254,7 +252,7 @@ def test_a_head_that_is_later_than_what_follows_is_left_out_and_noted(tmp_path: 
         truth_csv=f"time_us,x_m,y_m\n{head}10,2,0\n",
     )
     np.save(tmp_path / "signatures.npy", np.arange(3 * SIGNATURE_SIZE, dtype=np.float32).reshape(3, -1))
-    log = read_folder(tmp_path)
+    log = Log.read(tmp_path)
     assert log.odometry.a.tolist() == [2.0, 3.0]
     assert log.sightings.beacon_id.tolist() == [2]
     assert log.sightings.signature is not None and log.sightings.signature[0, 0] == 2 * SIGNATURE_SIZE
@@ -266,7 +264,7 @@ def test_a_head_that_is_later_than_what_follows_is_left_out_and_noted(tmp_path: 
     long_head = "".join(f"{900 + k},1,0\n" for k in range(20))
     write_files(tmp_path, odometry_csv=f"time_us,v_mps,omega_radps\n{long_head}10,2,0\n")
     with pytest.raises(BslamError, match=r"odometry\.csv, line 22, column time_us: '10'"):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_identities_that_are_words_are_kept_as_they_are(tmp_path: Path) -> None:
@@ -275,7 +273,7 @@ def test_identities_that_are_words_are_kept_as_they_are(tmp_path: Path) -> None:
         sightings_csv='time_us,beacon_id,bearing_rad\n0,exit sign,0\n0,"door, left",1\n5, ,1\n9,7.0,0\n',
         beacons_csv="beacon_id,x_m,y_m\nexit sign,1,2\nTür,3,4\n7,0,0\n",
     )
-    log = read_folder(tmp_path)
+    log = Log.read(tmp_path)
     assert [log.identity(one) for one in log.sightings.beacon_id.tolist()] == [
         "exit sign",
         "door, left",
@@ -284,19 +282,19 @@ def test_identities_that_are_words_are_kept_as_they_are(tmp_path: Path) -> None:
     ]
     assert log.beacons is not None
     assert [log.identity(one) for one in log.beacons.beacon_id.tolist()] == ["exit sign", "Tür", "7"]
-    write_folder(log, tmp_path / "again")
-    again = read_folder(tmp_path / "again")
+    log.write(tmp_path / "again")
+    again = Log.read(tmp_path / "again")
     assert_same_log(log, again)
     assert again.words == log.words
     # Numbers stay the numbers that they are.
-    assert read_folder(write_files(tmp_path / "again")).words == ()
+    assert Log.read(write_files(tmp_path / "again")).words == ()
 
 
 @pytest.mark.parametrize("text", ["nan", "-3", "2.5", "1e99", "inf", "x" * 65, "bell\a"])
 def test_an_identity_that_is_neither_a_number_nor_a_word_is_refused(tmp_path: Path, text: str) -> None:
     write_files(tmp_path, sightings_csv=f"time_us,beacon_id,bearing_rad\n0,3,0\n0,{text},0\n")
     with pytest.raises(BslamError, match=r"sightings\.csv, line 3, column beacon_id: .*a word of up to 64"):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_one_identity_at_two_places_is_refused(tmp_path: Path) -> None:
@@ -304,12 +302,12 @@ def test_one_identity_at_two_places_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         BslamError, match=r"line 4, column beacon_id: 'door'.*an identity that no row above has"
     ):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_a_log_without_the_column_of_identities_has_none(tmp_path: Path) -> None:
     write_files(tmp_path, sightings_csv="bearing_rad,time_us\n0.5,0\n")
-    log = read_folder(tmp_path)
+    log = Log.read(tmp_path)
     assert log.sightings.beacon_id.tolist() == [-1]
     assert not has_identities(log)
 
@@ -318,11 +316,11 @@ def test_a_log_without_the_column_of_identities_has_none(tmp_path: Path) -> None
     "text", ["time_us,x_m,y_m\n0,1,2\n9,3,4\n", "theta_rad,time_us,x_m,y_m\n1,0,1,2\n,9,3,4\n"]
 )
 def test_a_truth_may_lack_headings(tmp_path: Path, text: str) -> None:
-    log = read_folder(write_files(tmp_path, truth_csv=text))
+    log = Log.read(write_files(tmp_path, truth_csv=text))
     assert log.truth is not None and log.truth.x_m.tolist() == [1.0, 3.0]
     assert math.isnan(log.truth.theta_rad[1])
-    write_folder(log, tmp_path / "again")
-    assert_same_log(log, read_folder(tmp_path / "again"))
+    log.write(tmp_path / "again")
+    assert_same_log(log, Log.read(tmp_path / "again"))
 
 
 def test_a_sighting_of_range_alone_is_refused_by_name(tmp_path: Path) -> None:
@@ -330,20 +328,20 @@ def test_a_sighting_of_range_alone_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(
         BslamError, match=r"line 3, column bearing_rad: ''.*a sighting of range alone cannot be"
     ):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_settings_of_the_core_stand_in_a_table_of_robot_toml(tmp_path: Path) -> None:
     write_files(tmp_path, robot_toml=ROBOT_TOML + "[settings]\ngate_d2 = 0\nturn_sd_per_sqrt_m = 0.04\n")
-    log = read_folder(tmp_path)
+    log = Log.read(tmp_path)
     assert log.robot.settings == (("gate_d2", 0), ("turn_sd_per_sqrt_m", 0.04))
-    write_folder(log, tmp_path / "again")
-    assert_same_log(log, read_folder(tmp_path / "again"))
+    log.write(tmp_path / "again")
+    assert_same_log(log, Log.read(tmp_path / "again"))
     write_files(tmp_path, robot_toml=ROBOT_TOML + "[settings]\ngate_d2 = 'none'\n")
     with pytest.raises(
         BslamError, match=r"robot\.toml, key settings: .*a table of the core's settings, each a"
     ):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_a_file_that_unpacks_to_more_than_there_is_room_for_is_refused(tmp_path: Path, monkeypatch) -> None:
@@ -353,7 +351,7 @@ def test_a_file_that_unpacks_to_more_than_there_is_room_for_is_refused(tmp_path:
     with pytest.raises(
         BslamError, match=r"odometry\.csv\.gz: it holds more than 1 MB of text; allowed: at most"
     ):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 @given(st.floats(-100.0, 100.0))
@@ -506,19 +504,19 @@ def test_read_of_a_bad_folder_names_the_place(
     tmp_path: Path, changed: dict[str, str | None], expected: str
 ) -> None:
     with pytest.raises(BslamError, match=expected):
-        read_folder(write_files(tmp_path, **changed))
+        Log.read(write_files(tmp_path, **changed))
 
 
 def test_read_of_no_folder_says_what_a_log_is(tmp_path: Path) -> None:
     with pytest.raises(BslamError, match="no such folder; a log is a folder with"):
-        read_folder(tmp_path / "nothing")
+        Log.read(tmp_path / "nothing")
 
 
 def test_read_of_a_table_that_is_there_twice_says_so(tmp_path: Path) -> None:
     write_files(tmp_path)
     (tmp_path / "truth.csv.gz").write_bytes(b"")
     with pytest.raises(BslamError, match=r"both truth\.csv and truth\.csv\.gz"):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -528,13 +526,13 @@ def test_read_of_a_broken_gzip_file_names_it(tmp_path: Path, content: bytes) -> 
     write_files(tmp_path, odometry_csv=None)
     (tmp_path / "odometry.csv.gz").write_bytes(content)
     with pytest.raises(BslamError, match=r"odometry\.csv\.gz(: cannot be read|, line 1)"):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def test_read_of_a_robot_toml_that_is_not_utf8_names_it(tmp_path: Path) -> None:
     (write_files(tmp_path) / "robot.toml").write_bytes(b"# m\xe8tres\n")
     with pytest.raises(BslamError, match=r"robot\.toml: cannot be read: .*allowed: a UTF-8 text file"):
-        read_folder(tmp_path)
+        Log.read(tmp_path)
 
 
 def reference_logs() -> list[Path]:
@@ -547,7 +545,7 @@ def test_read_of_the_reference_logs_is_complete_and_quick() -> None:
     if not logs:
         pytest.skip("no reference logs: set BSLAM_DATA to a directory that has paper_room/")
     begin_s = time.process_time()
-    read = [read_folder(path) for path in logs]
+    read = [Log.read(path) for path in logs]
     assert (time.process_time() - begin_s) / len(logs) < 0.5  # a run has two seconds for everything
     for log in read:
         assert log.odometry.kind == "wheels"
@@ -569,13 +567,13 @@ def with_looks(log: Log) -> Log:
 
 def test_signatures_and_seeds_are_kept_to_the_bit(tmp_path: Path) -> None:
     log = with_looks(a_log())
-    write_folder(log, tmp_path)
-    back = read_folder(tmp_path)
+    log.write(tmp_path)
+    back = Log.read(tmp_path)
     np.testing.assert_array_equal(back.sightings.signature, log.sightings.signature)
     np.testing.assert_array_equal(back.seeds, log.seeds)
-    write_folder(a_log(), tmp_path)  # a log without takes them away
-    assert read_folder(tmp_path).sightings.signature is None
-    assert read_folder(tmp_path).seeds is None
+    a_log().write(tmp_path)  # a log without takes them away
+    assert Log.read(tmp_path).sightings.signature is None
+    assert Log.read(tmp_path).seeds is None
 
 
 @pytest.mark.parametrize(
@@ -586,7 +584,7 @@ def test_looks_that_are_not_what_they_should_be_are_refused(
     tmp_path: Path, name: str, allowed: str, fault: str
 ) -> None:
     log = with_looks(a_log())
-    write_folder(log, tmp_path)
+    log.write(tmp_path)
     good = np.load(tmp_path / name)
     bad: object = {
         "rows": np.ones((200, SIGNATURE_SIZE), np.float32),
@@ -602,5 +600,5 @@ def test_looks_that_are_not_what_they_should_be_are_refused(
     else:
         np.save(tmp_path / name, bad)
     with pytest.raises(BslamError, match=name) as refusal:
-        read_folder(tmp_path)
+        Log.read(tmp_path)
     assert ("finite" if fault in ("nan", "inf") else allowed) in str(refusal.value)

@@ -113,7 +113,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "detect": LOG | {"core", "datasets", "rig", "scannerfile", "view"},
 }
 # The command line ties the parts together and may import them all; so does what the package offers its users.
-PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})
+PYTHON_TOP = frozenset({"api", "cli", "commands", "__main__", "__init__"})
 RAW_LAYERS = frozenset({"core/raw.py", "world/camera/raw.py"})
 EXTENSIONS = re.compile(r"bslam\.(core|world\.camera)\._[a-z]")
 

@@ -24,7 +24,7 @@ from typing import Any
 from bslam.commands.arguments import CAMERA_STORE
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.log import Log, first_steps, read_folder
+from bslam.log import Log, first_steps
 from bslam.options import FILTERS, RunOptions
 from bslam.recording.recorder import FINGERPRINT_START
 from bslam.rig import load_rig
@@ -100,7 +100,7 @@ def read_log(options: argparse.Namespace) -> Log:
     """The log that the command line names. A drive seen by cameras is rendered once, which takes minutes."""
     folder = Path(options.log)
     if folder.is_dir():
-        return read_folder(folder)
+        return Log.read(folder)
     scenario = load_scenario(options.log)
     if options.rig is None:
         return simulate(scenario, options.seed)

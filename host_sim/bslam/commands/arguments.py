@@ -6,7 +6,6 @@ import argparse
 import math
 import tomllib
 from collections.abc import Callable, Container, Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,10 +28,9 @@ from bslam.options import (
     Number,
     RunOptions,
     parse_association,
-    usual_filter,
 )
 from bslam.runs.camera import SCANNER_THRESHOLD, TOLD_THRESHOLD, UNTOLD_THRESHOLD
-from bslam.runs.sources import CameraSource, Says, ScenarioSource
+from bslam.runs.sources import CameraSource, Says, ScenarioSource, options_for
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 from bslam.world.scenario import load_scenario
 
@@ -279,12 +277,9 @@ def run_options(
     says: what the sightings tell; by default as all simulated ones do.
     """
     _check_map(arguments)
-    association = changes.pop("association", arguments.association)
-    if arguments.known_map and says.identities:
-        says = replace(says, signatures=False)
-    name, rate = association or (says.association, 0.0)
     values = {
-        "observation": arguments.observation or says.observation,
+        "association": arguments.association,
+        "observation": arguments.observation,
         "filter": arguments.filter,
         "sigma_mps": arguments.sigma,
         "motion": arguments.motion,
@@ -305,10 +300,7 @@ def run_options(
     values |= changes
     if values["sensor"] == "recorded":  # how a map lies as a whole is an error of the first metres
         values.setdefault("map_align", "rigid")
-    if values["filter"] is None:
-        has_map = values["known_map"] or values["kept_map"] is not None
-        values["filter"] = "invariant" if has_map else usual_filter(values["observation"])
-    return RunOptions(association=name, wrong_identity_rate=rate, **values)
+    return options_for(says, values)
 
 
 def core_parameters(arguments: argparse.Namespace) -> dict[str, Number]:

@@ -21,7 +21,7 @@ from bslam.calibration.camera_pitch import find_pitch, load_drive
 from bslam.calibration.sensor_yaw import find_yaw
 from bslam.commands.report import table_of
 from bslam.errors import BslamError
-from bslam.log import read_folder
+from bslam.log import Log
 from bslam.rig import LENS_KINDS, Camera
 from bslam.runs.output import write_atomically
 
@@ -95,7 +95,7 @@ def execute_camera(arguments: argparse.Namespace) -> int:
     elif arguments.board_height is not None:
         raise BslamError("--board-height: says nothing by itself; allowed: together with --plumb DIR")
     if arguments.log is not None:
-        yaw = find_yaw(read_folder(arguments.log))
+        yaw = find_yaw(Log.read(arguments.log))
     file = arguments.out / "camera.toml"
     write_atomically(file, as_toml(calibration, mounting, yaw, str(folder)))
     print("\n".join(_describe(calibration, mounting, yaw)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ def execute(arguments: argparse.Namespace) -> int:
     for name, check in list(_checks(arguments.logs, arguments.robot)):
         report = check()
         entries.append(_entry(name, report, arguments.out))
-        print(_text(name, entries[-1]))
+        print(replace(report, name=name))
         write_json(arguments.out / "summary.json", {"schema": SCHEMA, "logs": entries})
     print(f"files in {arguments.out}: summary.json" + (", NAME.N.png" if _pictures(entries) else ""))
     return 1 if any(entry["findings"] for entry in entries) else 0
@@ -133,14 +134,3 @@ def _saved(name: str, number: int, one: Finding, out: Path) -> dict[str, Any]:
 
 def _pictures(entries: list[dict[str, Any]]) -> bool:
     return any("picture" in one for entry in entries for one in entry["findings"])
-
-
-def _text(name: str, entry: dict[str, Any]) -> str:
-    """A log's entry for the screen."""
-    count = len(entry["findings"])
-    lines = [f"{name}: {count} finding{'' if count == 1 else 's'}"]
-    for word, ones in (("found", entry["findings"]), ("note", entry["notes"])):
-        for one in ones:
-            lines += [f"  {word}: {one['kind']}: {one['what']}", f"    sure: {one['sure']}"]
-            lines.append(f"    mend: {one['mend']}")
-    return "\n".join([*lines, *(f"  not tested: {one}" for one in entry["not_tested"])])

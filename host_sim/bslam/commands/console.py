@@ -19,7 +19,7 @@ from bslam.core.errors import CoreError
 from bslam.core.slam import BY_APPEARANCE
 from bslam.errors import BslamError
 from bslam.link.messages import Health, PoseReport
-from bslam.log import Log, read_folder
+from bslam.log import Log
 from bslam.recording import RecordingWriter
 from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, Start, State
 from bslam.recording.recorder import MAP_PERIOD_US
@@ -90,7 +90,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _drive(arguments: argparse.Namespace) -> int:
     folder = Path(arguments.drive)
-    log = read_folder(folder) if folder.is_dir() else simulate(load_scenario(arguments.drive), arguments.seed)
+    log = Log.read(folder) if folder.is_dir() else simulate(load_scenario(arguments.drive), arguments.seed)
     arguments.target = arguments.robot
     options = run_options(arguments, says=what_it_says(log), sensor="recorded", seed=arguments.seed)
     screen = _Screen(f"{arguments.robot}, driven by {log.name}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bslam.evaluation.consistency import nees_band_95
 from bslam.evaluation.metrics import WINDOW_S, Evaluation
@@ -25,22 +26,28 @@ _ALIGNED = {
 
 def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> None:
     """Write NAME.map.png and, if there is a truth, NAME.error.png."""
-    write_atomically(out / f"{name}.map.png", png(draw_room(room(name, source, log, trace, evaluation))))
+    write_atomically(
+        out / f"{name}.map.png", png(draw_room(room(name, log, trace, evaluation, source.walls_m())))
+    )
     path = out / f"{name}.error.png"
     path.unlink(missing_ok=True)
     if evaluation is not None and np.isfinite(evaluation.error_m).any():
-        series = Series(
-            name,
-            evaluation.time_s,
-            evaluation.error_m[None],
-            evaluation.nees[None],
-            nees_band_95(1),
-            WINDOW_S,
-        )
-        write_atomically(path, png(draw_run(series)))
+        write_atomically(path, png(draw_run(series(name, evaluation))))
 
 
-def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> Room:
+def series(name: str, evaluation: Evaluation) -> Series:
+    """What the picture of error and NEES shows."""
+    error_m, nees = evaluation.error_m[None], evaluation.nees[None]
+    return Series(name, evaluation.time_s, error_m, nees, nees_band_95(1), WINDOW_S)
+
+
+def room(
+    name: str,
+    log: Log,
+    trace: Trace,
+    evaluation: Evaluation | None,
+    walls_m: NDArray[np.float64],
+) -> Room:
     """What the picture of the map shows, in the frame of the truth; without one, in that of the map."""
     if evaluation is None:
         mapped = [Mapped(one.x_m, one.y_m, one.covariance_m2, one.confirmed) for one in trace.beacons]
@@ -52,7 +59,7 @@ def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluati
         beacons=log.beacons,
         identity=log.identity,
         mapped=[_in_truth(beacon, evaluation) for beacon in trace.beacons],
-        walls_m=source.walls_m(),
+        walls_m=walls_m,
     )
 
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.log import Log, read_folder, write_folder
-from bslam.options import RunOptions, usual_filter
+from bslam.log import Log
+from bslam.options import RunOptions
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.recording.entries import State, TruePose
 from bslam.recording.reader import SUFFIX
 from bslam.runs.output import tum, write_atomically
 from bslam.runs.runner import run_log
-from bslam.runs.sources import what_it_says
+from bslam.runs.sources import options_for, what_it_says
 
 SUMMARY = "write a recording or a log in another format: tum, csv, mcap"
 EXAMPLES = """examples:
@@ -71,24 +71,21 @@ def _to_tum(path: Path, out: Path) -> list[Path]:
 
 def _to_csv(path: Path, out: Path) -> list[Path]:
     folder = out / path.stem
-    write_folder(as_log(_recording(path, "csv")), folder)
+    as_log(_recording(path, "csv")).write(folder)
     return [folder]
 
 
 def _to_mcap(path: Path, out: Path) -> list[Path]:
     if not path.is_dir():
         raise BslamError(f"{path}: allowed with --format mcap: a log folder")
-    log = read_folder(path)
+    log = Log.read(path)
     file = out / f"{log.name}{SUFFIX}"
     run_log(log, _default_options(log), record=file)
     return [file]
 
 
 def _default_options(log: Log) -> RunOptions:
-    says = what_it_says(log)
-    return RunOptions(
-        says.observation, says.association, filter=usual_filter(says.observation), sensor="recorded"
-    )
+    return options_for(what_it_says(log), {"sensor": "recorded"})
 
 
 _FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"tum": _to_tum, "csv": _to_csv, "mcap": _to_mcap}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bslam.core.raw import library
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 PRESETS = ("real-wheels", "paper", "commanded", "camera", "bearing-only")
 """Their names, in the order of bslam_preset_t. The first two set everything, the others go on top."""
@@ -21,7 +21,8 @@ def preset_settings(names: Iterable[str], association: int, filter_: int) -> dic
     settings = raw.ffi.new("bslam_settings_t *")
     for name in (PRESETS[0], *names):
         if name not in PRESETS:
-            raise BslamError(f"preset '{name}' does not exist; allowed: {', '.join(PRESETS)}")
+            near = did_you_mean(name, PRESETS)
+            raise BslamError(f"preset '{name}' does not exist; allowed: {', '.join(PRESETS)}{near}")
         raw.lib.bslam_settings_preset(settings, PRESETS.index(name))
         settings.association, settings.filter = association, filter_
     return {raw.text(info.name): getattr(settings, raw.text(info.name)) for info in raw.settings_infos()}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 from bslam.core.errors import CoreError
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
 from bslam.rig import Camera
 
@@ -138,7 +138,8 @@ def _answer_callbacks(ffi: Any) -> None:
 def library(real: str, beacons_max: int) -> Library:
     """The smallest build of scalar type `real` that holds beacons_max beacons."""
     if real not in REALS:
-        raise BslamError(f"scalar type {real!r}: allowed are {', '.join(REALS)}")
+        near = did_you_mean(real, REALS)
+        raise BslamError(f"scalar type {real!r}: allowed are {', '.join(REALS)}{near}")
     for size in SIZE_CLASSES:
         if size >= beacons_max >= 1:
             return Library(real, size)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bslam.core.appearance import SIGNATURE_SIZE, encode
 from bslam.core.inputs import INT32, checked_rows, frame_rows, number, whole
 from bslam.core.raw import Flash, library
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 BY_APPEARANCE = (3, 6, 7, 8)
 """Values of the setting `association` by which classifiers learn."""
@@ -115,7 +115,10 @@ class Slam:
             raise BslamError(f"settings {params!r}: allowed is a mapping, names to numbers")
         for name, value in params.items():
             if name not in self._table:
-                raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}")
+                near = did_you_mean(str(name), self._table)
+                raise BslamError(
+                    f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}{near}"
+                )
             parameter, value = self._table[name], number(value, f"parameter {name} =")
             if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
                 kind = "a whole number" if parameter.is_integer else "a number"
@@ -203,7 +206,8 @@ class Slam:
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
         if kind not in self._sources:
-            raise BslamError(f"odometry of kind {kind!r}: allowed are {', '.join(self._sources)}")
+            near = did_you_mean(str(kind), self._sources)
+            raise BslamError(f"odometry of kind {kind!r}: allowed are {', '.join(self._sources)}{near}")
         source, name_a, name_b = self._sources[kind]
         where = f"odometry at {time_us} us"
         reading = self._reading

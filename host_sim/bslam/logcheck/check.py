@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from bslam.errors import BslamError
-from bslam.log import Log, read_folder
+from bslam.log import Log
 from bslam.logcheck import verdict
 from bslam.logcheck.drive import Drive, Factors, drive_of
 from bslam.logcheck.files import are_degrees, check_files, degrees_finding
@@ -31,7 +31,7 @@ def check_folder(folder: Path) -> Report:
         copy = Path(place) / folder.resolve().name
         found = check_files(folder, copy) if folder.is_dir() else []
         try:
-            report = check_log(read_folder(copy if found else folder))
+            report = check_log(Log.read(copy if found else folder))
         except BslamError as error:
             raise BslamError(str(error).replace(str(copy), str(folder))) from error
     return replace(report, findings=[*found, *report.findings])

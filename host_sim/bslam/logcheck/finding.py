@@ -43,9 +43,22 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """All that was found in a log, and what could not be tested."""
+    """All that was found in a log, and what could not be tested. As a text: what `bslam check` prints."""
 
     name: str
     findings: list[Finding]
     untested: list[str]
     estimates: dict[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        found = [one for one in self.findings if not one.is_note]
+        notes = [one for one in self.findings if one.is_note]
+        lines = [f"{self.name}: {len(found)} finding{'' if len(found) == 1 else 's'}"]
+        for word, ones in (("found", found), ("note", notes)):
+            for one in ones:
+                lines += [
+                    f"  {word}: {one.kind}: {one.what}",
+                    f"    sure: {one.sure}",
+                    f"    mend: {one.mend}",
+                ]
+        return "\n".join([*lines, *(f"  not tested: {one}" for one in self.untested)])

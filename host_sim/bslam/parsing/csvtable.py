@@ -1,4 +1,5 @@
-"""CSV files with a header and rows below it, read strictly: every error names file, line and column."""
+"""Tables with named columns, of CSV files or of dataframes, read strictly: every error names file, line and
+column."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,42 @@ HEAD_ROWS = 10
 
 
 @dataclass(frozen=True)
-class Table:
-    """The columns of one file."""
+class Origin:
+    """Where a table comes from, for messages: a file, whose lines count from 1, or a dataframe, whose rows do
+    from 0."""
 
-    path: Path
+    name: str  # path of the file; "odometry" of a dataframe
+    is_file: bool
+
+    @property
+    def header(self) -> str:
+        """Where the names of the columns stand."""
+        return f"{self.name}, line 1" if self.is_file else self.name
+
+    @property
+    def first(self) -> int:
+        """The number of the first row of values."""
+        return 2 if self.is_file else 0
+
+    def line(self, number: int) -> str:
+        """A row by its number."""
+        return f"line {number}" if self.is_file else f"row {number}"
+
+    def error(self, number: int, column: str, text: str, allowed: str) -> BslamError:
+        """That a field is not allowed, and what is."""
+        value = repr(text) if text or self.is_file else "a missing value (None, NaN)"
+        where = f"{self.name}, {self.line(number)}, column {column}"
+        return BslamError(f"{where}: {value} is not allowed; allowed: {allowed}")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of one file or dataframe."""
+
+    origin: Origin
     texts: Mapping[str, Sequence[str]]  # the fields as they stand in the file, by column
     values: Mapping[str, NDArray[np.float64]]  # (rows,) each; NaN in a column of words
-    line: NDArray[np.int64]  # (rows,) of the file
+    line: NDArray[np.int64]  # (rows,) of the file; row of the dataframe
 
     @property
     def rows(self) -> int:
@@ -60,14 +90,13 @@ class Table:
             name: [one for one, keep in zip(column, kept, strict=True) if keep]
             for name, column in self.texts.items()
         }
-        return Table(
-            self.path, texts, {name: one[kept] for name, one in self.values.items()}, self.line[kept]
-        )
+        values = {name: one[kept] for name, one in self.values.items()}
+        return Table(self.origin, texts, values, self.line[kept])
 
     def require_rows(self, allowed: str) -> None:
         """Raise BslamError if there is nothing below the header."""
         if self.rows == 0:
-            raise BslamError(f"{self.path}: no rows below the header; {allowed}")
+            raise BslamError(f"{self.origin.name}: no rows below the header; {allowed}")
 
     def require(self, column: str, good: NDArray[np.bool_], allowed: str) -> None:
         """Raise BslamError for the first row of `column` that is not `good`."""
@@ -76,7 +105,7 @@ class Table:
 
     def error(self, row: int, column: str, allowed: str) -> BslamError:
         """That a field is not allowed, and what is."""
-        return _field_error(self.path, int(self.line[row]), column, self.texts[column][row], allowed)
+        return self.origin.error(int(self.line[row]), column, self.texts[column][row], allowed)
 
     def require_order(self, column: str, strict: bool) -> None:
         """The values, none negative, must rise from row to row; unless `strict`, they may also stay."""
@@ -93,8 +122,8 @@ class Table:
         kept = np.zeros(self.rows, dtype=np.bool_)
         kept[np.unique(np.column_stack(codes), axis=0, return_index=True)[1]] = True
         if not kept.all():
-            count, first = self.rows - int(kept.sum()), self.line[int(np.argmin(kept))]
-            notes.append(f"{self.path}: left out {rows_text(count)} equal to one above, first line {first}")
+            count, first = self.rows - int(kept.sum()), self.origin.line(self.line[int(np.argmin(kept))])
+            notes.append(f"{self.origin.name}: left out {rows_text(count)} equal to one above, first {first}")
         return kept
 
     def begun(self, column: str, notes: list[str]) -> NDArray[np.bool_]:
@@ -102,8 +131,9 @@ class Table:
         times = self.values[column]
         first = began_at(times)
         if first:
-            where = f"line {self.line[first]}, {column} {self.texts[column][first]}"
-            notes.append(f"{self.path}: left out {rows_text(first)} at the start: time runs back to {where}")
+            where = f"{self.origin.line(self.line[first])}, {column} {self.texts[column][first]}"
+            left_out = f"left out {rows_text(first)} at the start"
+            notes.append(f"{self.origin.name}: {left_out}: time runs back to {where}")
         return np.arange(self.rows) >= first
 
 
@@ -129,10 +159,29 @@ def read_table(
     """
     lines = _read_text(path).splitlines()
     names = [name.strip() for name in _fields(lines[0])] if lines else []
-    columns = _match_layout(path, names, layouts, optional or {})
-    texts = dict(zip(names, _split(path, lines, len(names)), strict=True))
-    line = np.arange(2, len(lines) + 1, dtype=np.int64)
-    return Table(path, texts, {name: _parse(path, name, columns[name], texts[name]) for name in names}, line)
+    origin = Origin(str(path), is_file=True)
+    columns = _match_layout(origin, names, layouts, optional or {})
+    return _table(origin, columns, dict(zip(names, _split(path, lines, len(names)), strict=True)))
+
+
+def table_of_texts(
+    name: str,
+    texts: Mapping[str, Sequence[str]],
+    layouts: Sequence[Mapping[str, Column]],
+    optional: Mapping[str, Column] | None = None,
+) -> Table:
+    """`read_table` of columns at hand, of one length, with their fields as a CSV file would hold them.
+
+    `name` stands for the file. Raises BslamError that names row, column, value and what is allowed.
+    """
+    origin = Origin(name, is_file=False)
+    return _table(origin, _match_layout(origin, list(texts), layouts, optional or {}), texts)
+
+
+def _table(origin: Origin, columns: Mapping[str, Column], texts: Mapping[str, Sequence[str]]) -> Table:
+    values = {name: _parse(origin, name, columns[name], fields) for name, fields in texts.items()}
+    rows = len(next(iter(texts.values())))
+    return Table(origin, texts, values, origin.first + np.arange(rows, dtype=np.int64))
 
 
 def _read_text(path: Path) -> str:
@@ -151,7 +200,10 @@ def _read_text(path: Path) -> str:
 
 
 def _match_layout(
-    path: Path, names: Sequence[str], layouts: Sequence[Mapping[str, Column]], optional: Mapping[str, Column]
+    origin: Origin,
+    names: Sequence[str],
+    layouts: Sequence[Mapping[str, Column]],
+    optional: Mapping[str, Column],
 ) -> dict[str, Column]:
     required = [name for name in names if name not in optional]
     for layout in layouts:
@@ -160,8 +212,11 @@ def _match_layout(
     wanted = " or ".join(",".join(layout) for layout in layouts)
     extra = f" (and perhaps {','.join(optional)})" if optional else ""
     why = "".join(f"; {one.why}" for name, one in layouts[0].items() if one.why and name not in names)
+    known = {name for one in (*layouts, optional) for name in one}
+    unknown = next((name for name in names if name not in known), "")
     raise BslamError(
-        f"{path}, line 1: columns {','.join(names)!r} are not allowed; allowed: {wanted}{extra}{why}"
+        f"{origin.header}: columns {','.join(names)!r} are not allowed; allowed: {wanted}{extra}{why}"
+        + did_you_mean(unknown, known - set(names))
     )
 
 
@@ -181,7 +236,7 @@ def _split(path: Path, lines: Sequence[str], width: int) -> list[list[str]]:
     ]
 
 
-def _parse(path: Path, name: str, column: Column, texts: Sequence[str]) -> NDArray[np.float64]:
+def _parse(origin: Origin, name: str, column: Column, texts: Sequence[str]) -> NDArray[np.float64]:
     """The numbers of one column; an empty field becomes what the column says it stands for."""
     if column.words:
         return np.full(len(texts), np.nan)
@@ -189,7 +244,7 @@ def _parse(path: Path, name: str, column: Column, texts: Sequence[str]) -> NDArr
         values = np.array([float(text or "nan") for text in texts], dtype=np.float64)
     except ValueError:
         row = next(row for row, text in enumerate(texts) if not is_number(text or "nan"))
-        raise _field_error(path, row + 2, name, texts[row], column.allowed) from None
+        raise origin.error(row + origin.first, name, texts[row], column.allowed) from None
     good = column.holds(values)
     if column.empty is not None:
         empty = np.array([text == "" for text in texts], dtype=np.bool_)
@@ -197,7 +252,7 @@ def _parse(path: Path, name: str, column: Column, texts: Sequence[str]) -> NDArr
         good |= empty
     if not good.all():
         row = int(np.argmin(good))
-        raise _field_error(path, row + 2, name, texts[row], column.allowed)
+        raise origin.error(row + origin.first, name, texts[row], column.allowed)
     return values
 
 
@@ -208,7 +263,3 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _field_error(path: Path, line: int, name: str, text: str, allowed: str) -> BslamError:
-    return BslamError(f"{path}, line {line}, column {name}: {text!r} is not allowed; allowed: {allowed}")

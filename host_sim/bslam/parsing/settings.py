@@ -10,17 +10,18 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What a key may hold: its TOML type (`float` takes integers too), a test, and the words for both.
+    """What a key may hold: its type (`float` takes integers too), a test, and the words for both.
 
     `make` turns a good value into what the program works with. `more` is what a JSON schema can say of the
     test, for editors.
@@ -39,7 +40,7 @@ class Rule:
 
     def convert(self, value: object, where: str) -> Any:
         """The value to work with, or a BslamError that starts with `where` (file and key)."""
-        right_type = isinstance(value, (int, float) if self.kind is float else self.kind)
+        right_type = isinstance(value, _NUMBERS.get(self.kind, self.kind))
         if isinstance(value, bool) and self.kind is not bool:
             right_type = False
         try:
@@ -47,9 +48,12 @@ class Rule:
                 return self.make(typed)
         except OverflowError:  # an integer that no double can hold
             pass
-        raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}")
+        near = did_you_mean(value, self.more.get("enum", ())) if isinstance(value, str) else ""
+        raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}{near}")
 
 
+_NUMBERS: dict[type, type] = {float: Real, int: Integral}
+"""Numpy's are numbers, too."""
 _SCHEMA_TYPES = {
     float: "number",
     int: "integer",
@@ -112,7 +116,8 @@ def find_toml(what: str, name_or_path: str | Path, folder: Path) -> Path:
     path = Path(text) if text.endswith(".toml") else folder / f"{text}.toml"
     if not path.is_file():
         allowed = f"{', '.join(toml_names(folder))}, or a path that ends in .toml"
-        raise BslamError(f"{what} {text!r}: there is no such {what} or file; allowed: {allowed}")
+        near = did_you_mean(text, toml_names(folder))
+        raise BslamError(f"{what} {text!r}: there is no such {what} or file; allowed: {allowed}{near}")
     return path
 
 
@@ -130,9 +135,12 @@ def parse_table(cls: type[T], table: Mapping[str, object], where: str) -> T:
     """`cls` from a TOML table; `where` (the file, and the table in it) starts every error."""
     known: dict[str, Field[Any]] = {one.name: one for one in fields(cls)}  # type: ignore[arg-type]
     check_keys(table, known, where)
-    for name, one in known.items():
-        if one.default is MISSING and name not in table:
-            raise BslamError(f"{where}, key {name}: is missing; allowed: {one.metadata['rule'].allowed}")
+    missing = [one for name, one in known.items() if one.default is MISSING and name not in table]
+    if missing:
+        first, *others = (one.name for one in missing)
+        more = f"; also missing: {', '.join(others)}" if others else ""
+        allowed = missing[0].metadata["rule"].allowed
+        raise BslamError(f"{where}, key {first}: is missing; allowed: {allowed}{more}")
     values = {
         key: known[key].metadata["rule"].convert(value, f"{where}, key {key}") for key, value in table.items()
     }
@@ -143,4 +151,5 @@ def check_keys(table: Mapping[str, object], known: Mapping[str, object], where: 
     """Raise BslamError for a key that nobody knows: most often a misspelt one."""
     for key in table:
         if key not in known:
-            raise BslamError(f"{where}, key {key}: no such key; allowed: {', '.join(known)}")
+            near = did_you_mean(key, known)
+            raise BslamError(f"{where}, key {key}: no such key; allowed: {', '.join(known)}{near}")

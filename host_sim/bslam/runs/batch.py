@@ -23,7 +23,7 @@ from tqdm import tqdm
 from bslam.errors import BslamError
 from bslam.evaluation.metrics import Evaluation, describe, evaluate, summarise
 from bslam.evaluation.trace import Trace
-from bslam.log import Log, write_folder
+from bslam.log import Log
 from bslam.options import RunOptions
 from bslam.runs.output import write_run, write_summary
 from bslam.runs.rerun import rerun
@@ -164,7 +164,7 @@ def run_job(
 def _execute(job: Job, out: Path) -> Outcome:
     log = job.source.load()
     if job.record:
-        write_folder(log, out / job.name)
+        log.write(out / job.name)
     trace, more = run_job(job, log, out)
     return write_files(job, out, log, trace, more)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from bslam.datasets.dlr import load_dlr
 from bslam.datasets.mrclam import best_truth, load_mrclam
 from bslam.errors import BslamError
 from bslam.evaluation.align import Rigid
-from bslam.log import Log, has_identities, read_folder
+from bslam.log import Log, has_identities
+from bslam.options import RunOptions, parse_association, usual_filter
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
@@ -41,6 +42,22 @@ class Says:
     def association(self) -> str:
         """What tells whose they are."""
         return "both" if self.signatures else "known" if self.identities else "mahalanobis"
+
+
+def options_for(says: Says, words: Mapping[str, Any]) -> RunOptions:
+    """Options of a run by their names; what is not said, or None, by what the sightings tell.
+
+    `association` is one as on the command line, "known:0.05", or such a name with its rate.
+    """
+    given = {name: value for name, value in words.items() if value is not None}
+    if given.get("known_map") and says.identities:
+        says = replace(says, signatures=False)
+    association = given.pop("association", says.association)
+    name, rate = parse_association(association) if isinstance(association, str) else association
+    observation = given.setdefault("observation", says.observation)
+    has_map = given.get("known_map", False) or "kept_map" in given
+    given.setdefault("filter", usual_filter(observation, has_map))
+    return RunOptions(association=name, wrong_identity_rate=rate, **given)
 
 
 def what_it_says(log: Log) -> Says:
@@ -175,7 +192,7 @@ class FolderSource(_Unshared):
             return Says()
 
     def load(self) -> Log:
-        return read_folder(self.path)
+        return Log.read(self.path)
 
     def walls_m(self) -> NDArray[np.float64]:
         return np.empty((0, 4))

@@ -49,7 +49,14 @@ def draw_room(room: Room) -> Figure:
     width_m, height_m = high_m - low_m
     width_in = float(np.clip(9.0 * np.sqrt(width_m / height_m), 6.5, 11.0))
     figure = new_figure(width_in, float(np.clip(width_in * height_m / width_m, 4.0, 11.0)) + 0.8)
+    draw_room_in(figure, room, legend_columns=6)
+    return figure
+
+
+def draw_room_in(figure: Any, room: Room, legend_columns: int) -> None:
+    """The same in an empty figure, or in a part of one."""
     axes = figure.add_subplot()
+    low_m, high_m = _extent(room)
     for x1, y1, x2, y2 in room.walls_m:
         axes.plot([x1, x2], [y1, y2], color=WALL, linewidth=3, solid_capstyle="round", zorder=2)
     if room.truth_m is not None:
@@ -67,8 +74,7 @@ def draw_room(room: Room) -> Figure:
     axes.set_ylim(low_m[1], high_m[1])
     tidy(axes, "x, m", "y, m")
     axes.set_title(room.title, fontsize=11)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=8, frameon=False)
-    return figure
+    figure.legend(loc="outside lower center", ncols=legend_columns, fontsize=8, frameon=False)
 
 
 def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:

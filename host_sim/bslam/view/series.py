@@ -31,12 +31,17 @@ class Series:
 def draw_run(series: Series) -> Figure:
     """Error and NEES, one above the other."""
     figure = new_figure(9.5, 6.0)
+    draw_run_in(figure, series)
+    return figure
+
+
+def draw_run_in(figure: Any, series: Series) -> None:
+    """The same in an empty figure, or in a part of one."""
     error_axes, nees_axes = figure.subplots(2, 1, sharex=True)
     draw_error(error_axes, series)
     draw_nees(nees_axes, series)
     error_axes.set_xlabel("")
     error_axes.set_title(series.title, fontsize=11)
-    return figure
 
 
 def draw_cells(title: str, cells: Sequence[Series]) -> Figure:

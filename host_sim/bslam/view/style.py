@@ -19,9 +19,16 @@ BAND: Final = "#4c9f70"
 _DPI: Final = 110
 
 
+class Drawing(Figure):
+    """A figure that a notebook shows when it is the value of a cell, without pyplot's global state."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
 def new_figure(width_in: float, height_in: float) -> Figure:
     """An empty figure of its own canvas: no global state, so that processes and threads may draw at once."""
-    figure = Figure(figsize=(width_in, height_in), dpi=_DPI, layout="constrained")
+    figure = Drawing(figsize=(width_in, height_in), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

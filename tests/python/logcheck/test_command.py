@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from bslam.cli import main
-from bslam.log import write_folder
 from logcheck.drives import made_up, with_sightings
 
 
 @pytest.fixture
 def folder(tmp_path):
     path = tmp_path / "drive"
-    write_folder(made_up(seconds=40.0), path)
+    made_up(seconds=40.0).write(path)
     return path
 
 
@@ -52,7 +51,7 @@ def test_check_a_good_folder_exits_0_and_writes_the_summary(folder, tmp_path, ca
 
 def test_check_a_finding_exits_1_with_a_picture_and_what_mends_it(folder, tmp_path, capsys):
     log = made_up(seconds=40.0)
-    write_folder(with_sightings(log, bearing_rad=-log.sightings.bearing_rad), folder)
+    with_sightings(log, bearing_rad=-log.sightings.bearing_rad).write(folder)
     status, (entry,), out = check(tmp_path, "csv", folder)
     assert status == 1
     (found,) = entry["findings"]
@@ -64,7 +63,7 @@ def test_check_a_finding_exits_1_with_a_picture_and_what_mends_it(folder, tmp_pa
 
 def test_check_several_logs_in_one_go(folder, tmp_path):
     other = tmp_path / "other"
-    write_folder(made_up(1, seconds=40.0), other)
+    made_up(1, seconds=40.0).write(other)
     assert [entry["name"] for entry in check(tmp_path, folder, other)[1]] == ["drive", "other"]
 
 

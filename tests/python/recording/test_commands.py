@@ -7,7 +7,7 @@ import pytest
 
 import bslam
 from bslam.cli import main
-from bslam.log import first_steps, write_folder
+from bslam.log import first_steps
 from bslam.recording import load
 from bslam.recording.entries import State
 from bslam.runs import sources
@@ -20,7 +20,7 @@ ROOM = Path(bslam.__file__).parent / "scenarios" / "paper_room.toml"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / NAME
-    write_folder(first_steps(simulate(load_scenario("paper_room"), 4), 80), path)
+    first_steps(simulate(load_scenario("paper_room"), 4), 80).write(path)
     return path
 
 

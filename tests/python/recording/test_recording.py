@@ -15,7 +15,7 @@ from zstandard import ZstdCompressor
 from bslam.cli import main
 from bslam.core.slam import Account, Beacon, Slam
 from bslam.errors import BslamError
-from bslam.log import first_steps, read_folder, write_folder
+from bslam.log import Log, first_steps
 from bslam.options import RunOptions
 from bslam.recording import Recorder, Recording, RecordingWriter, load
 from bslam.recording.aslog import as_log
@@ -209,12 +209,12 @@ def test_a_rerun_with_other_parameters_differs(recorded):
 
 
 def test_as_a_log_it_is_the_log_it_was_made_from(recorded, log, tmp_path):
-    write_folder(as_log(recorded), tmp_path / "through")
-    write_folder(log, tmp_path / "made")
+    as_log(recorded).write(tmp_path / "through")
+    log.write(tmp_path / "made")
     for path in sorted((tmp_path / "made").iterdir()):
         if path.name != "truth.csv":  # its last pose may stand after the last reading
             assert (tmp_path / "through" / path.name).read_bytes() == path.read_bytes(), path.name
-    assert read_folder(tmp_path / "through").truth is not None
+    assert Log.read(tmp_path / "through").truth is not None
 
 
 def test_without_a_robot_the_log_has_what_the_filter_was_told(recorded):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bslam.errors import BslamError
-from bslam.log import Log, write_folder
+from bslam.log import Log
 from bslam.options import RunOptions
 from bslam.runs import batch
 from bslam.runs.batch import Job, make_jobs, run_batch, run_names
@@ -111,7 +111,7 @@ def test_several_processes_give_the_same_as_one(made, tmp_path):
     folders = []
     for seed in range(2):
         folders.append(tmp_path / f"log{seed}")
-        write_folder(made.circle_log(30, seed=seed), folders[-1])
+        made.circle_log(30, seed=seed).write(folders[-1])
     jobs = make_jobs([FolderSource(one) for one in folders], [RunOptions()] * 2, None, 0)
     entries = []
     for processes in (1, 2):

@@ -7,7 +7,6 @@ import cv2
 import pytest
 
 from bslam.cli import main
-from bslam.log import write_folder
 from bslam.rig import Lens, load_rig
 from runs import boards
 from runs.test_calibrate_camera import views_of
@@ -31,7 +30,7 @@ def pictures(tmp_path_factory):
 def test_calibrate_camera_writes_a_rig_with_lens_and_mounting(pictures, tmp_path, made, capsys):
     log = made.circle_log(steps=600)
     sightings = replace(log.sightings, bearing_rad=log.sightings.bearing_rad - math.radians(7.0))
-    write_folder(replace(log, sightings=sightings), tmp_path / "drive")
+    replace(log, sightings=sightings).write(tmp_path / "drive")
     words = ["calibrate", "camera", str(pictures / "boards"), *BOARD, "--plumb", str(pictures / "plumb")]
     words += ["--board-height", "0.4", "--log", str(tmp_path / "drive"), "--out", str(tmp_path)]
     assert main(words) == 0

@@ -10,13 +10,12 @@ import pytest
 
 from bslam.cli import COMMANDS, main
 from bslam.core import Slam
-from bslam.log import write_folder
 
 
 @pytest.fixture
 def log_folder(made, tmp_path):
     folder = tmp_path / "drive"
-    write_folder(made.circle_log(60, seed=1), folder)
+    made.circle_log(60, seed=1).write(folder)
     return folder
 
 
@@ -130,7 +129,7 @@ def test_the_version_is_that_of_the_package(capsys):
 
 def test_replay_with_options_in_any_order(log_folder, made, tmp_path, capsys):
     other = tmp_path / "other"
-    write_folder(made.circle_log(40), other)
+    made.circle_log(40).write(other)
     out = tmp_path / "out"
     words = [
         "replay",
@@ -243,7 +242,7 @@ def test_sweep_runs_every_combination(tmp_path, capsys):
 
 def test_calibrate_writes_parameters_and_tries_them(made, tmp_path, capsys):
     for name, seed in (("first", 1), ("second", 2)):
-        write_folder(made.circle_log(2000, seed=seed), tmp_path / name)
+        made.circle_log(2000, seed=seed).write(tmp_path / name)
     out = tmp_path / "out"
     words = [
         "calibrate",
@@ -300,7 +299,7 @@ def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):
 
 def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, capsys):
     broken = tmp_path / "broken"
-    write_folder(made.circle_log(5), broken)
+    made.circle_log(5).write(broken)
     (broken / "odometry.csv").write_text("time_us,left_m,right_m\n40000,x,0\n")
     out = tmp_path / "out"
     assert (

@@ -9,7 +9,6 @@ from dataclasses import replace
 import pytest
 
 from bslam.cli import main
-from bslam.log import write_folder
 from bslam.runs.methods import shipped_methods
 
 STRANGERS = """
@@ -44,7 +43,7 @@ class Hangs(Still):
 def scene(made, tmp_path, monkeypatch):
     """A short log and a file of algorithms, in the working directory."""
     monkeypatch.chdir(tmp_path)
-    write_folder(made.circle_log(40, seed=1), tmp_path / "drive")
+    made.circle_log(40, seed=1).write(tmp_path / "drive")
     (tmp_path / "strangers_of_compare.py").write_text(STRANGERS)
     return tmp_path
 
@@ -129,7 +128,7 @@ def test_full_disk_is_named_by_its_file_and_what_fits_is_kept(scene, made):
     def no_room():  # no file may grow beyond this: the table does not, a trajectory does
         resource.setrlimit(resource.RLIMIT_FSIZE, (16_000, 16_000))
 
-    write_folder(made.circle_log(300, seed=1), scene / "long")
+    made.circle_log(300, seed=1).write(scene / "long")
     words = ["compare", "long", "--only", "dead_reckoning", "--jobs", "1", "--pictures", "0", "--out", "out"]
     command = [sys.executable, "-m", "bslam", *words]
     result = subprocess.run(command, preexec_fn=no_room, capture_output=True, text=True, check=False)

@@ -8,7 +8,7 @@ import pytest
 from bslam.datasets.datasets import data_root
 from bslam.datasets.mrclam import best_truth, load_mrclam
 from bslam.evaluation.metrics import evaluate, summarise
-from bslam.log import read_folder
+from bslam.log import Log
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
 
@@ -35,7 +35,7 @@ def test_filters_reach_what_an_independent_prototype_reached(filter_name):
         }
     options = RunOptions(filter=filter_name, velocity_states=False)
     for name in ("paper_room_700_sigma0.3", "paper_room_704_sigma0.6"):
-        entry = replay(read_folder(folder / name), options)
+        entry = replay(Log.read(folder / name), options)
         # The same filter, but not the same program: 5 % and a millimetre.
         expected_cm = float(reference[name]["mean_cm"])
         assert 100.0 * entry["position_error_m"]["mean"] == pytest.approx(expected_cm, rel=0.05, abs=0.1)

@@ -11,7 +11,7 @@ import pytest
 from bslam.cli import main
 from bslam.datasets.mrclam import load_mrclam
 from bslam.evaluation.align import Rigid, Similarity
-from bslam.log import Beacons, Odometry, Truth, write_folder
+from bslam.log import Beacons, Odometry, Truth
 
 REAL = {"wheel_noise": "actuation"}
 
@@ -22,7 +22,7 @@ def replay(tmp_path, capsys):
 
     def run(log, *words, kind="csv", status=0):
         folder = tmp_path / log.name
-        write_folder(log, folder)
+        log.write(folder)
         return of(folder, *words, kind=kind, status=status)
 
     def of(folder, *words, kind="csv", status=0):

@@ -5,14 +5,14 @@ import json
 import pytest
 
 from bslam.cli import main
-from bslam.log import first_steps, write_folder
+from bslam.log import first_steps
 from bslam.world.simulate import load_scenario, simulate
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / "short"
-    write_folder(first_steps(simulate(load_scenario("paper_room"), 2), 80), path)
+    first_steps(simulate(load_scenario("paper_room"), 2), 80).write(path)
     return path
 
 

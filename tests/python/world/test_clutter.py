@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from bslam.errors import BslamError
-from bslam.log import write_folder
 from bslam.world.arena import Arena, Beacon, Box, Wall
 from bslam.world.camera import dress
 from bslam.world.crowd import Crowd, Mover, Screens
@@ -155,7 +154,7 @@ def test_recorded_way_is_gone_as_recorded(
 ) -> None:
     short = Scenario(**(vars(paper_room) | {"steps": 400}))
     log = simulate(short, 8)
-    write_folder(log, tmp_path / "drive")
+    log.write(tmp_path / "drive")
     file = edited_room("[driving]\n", f'[driving]\nrecorded = "{tmp_path / "drive" / "truth.csv"}"\n')
     file.write_text(file.read_text().replace("steps = 5000", "steps = 400"))
     again = simulate(load_scenario(file), 99)
@@ -174,7 +173,7 @@ def test_recorded_way_that_is_missing_or_too_short_is_named(
 ) -> None:
     with pytest.raises(BslamError, match=r"key recorded: there is no file .*nowhere\.csv; allowed"):
         load_scenario(edited_room("[driving]\n", '[driving]\nrecorded = "nowhere.csv"\n'))
-    write_folder(simulate(Scenario(**(vars(paper_room) | {"steps": 40})), 8), tmp_path / "drive")
+    simulate(Scenario(**(vars(paper_room) | {"steps": 40})), 8).write(tmp_path / "drive")
     with pytest.raises(
         BslamError,
         match=r"key recorded: .* is shorter than the 200000000 us of the steps; allowed: .* 1600000 us",

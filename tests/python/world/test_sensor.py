@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bslam.log import Sightings, read_folder, wrap_rad
+from bslam.log import Log, Sightings, wrap_rad
 from bslam.world.arena import Arena, Beacon, Wall
 from bslam.world.scenario import Scenario, Sensor
 from bslam.world.sensor import is_visible, look, range_sigma_m, see
@@ -143,7 +143,7 @@ def test_sensor_model_sees_exactly_what_the_reference_logs_have(paper_room: Scen
     folder = data / "paper_room" / "paper_room_700_sigma0.3"
     if not folder.is_dir():
         pytest.skip("no reference logs: set BSLAM_DATA to a directory that has paper_room/")
-    log = read_folder(folder)
+    log = Log.read(folder)
     assert log.truth is not None
     start = paper_room.start  # its heading is 0: the map frame is only shifted
     poses = np.stack([log.truth.x_m + start.x_m, log.truth.y_m + start.y_m, log.truth.theta_rad], axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bslam.errors import BslamError
-from bslam.log import Log, read_folder, wrap_rad, write_folder
+from bslam.log import Log, wrap_rad
 from bslam.world.arena import Arena
 from bslam.world.robot import move_on_arc
 from bslam.world.scenario import Encoders, Gyro, Scenario
@@ -114,8 +114,8 @@ def test_simulate_makes_a_log_that_can_be_written_and_read(name: str, tmp_path: 
     scenario = replace(load_scenario(name), steps=200)
     log = simulate(scenario, 5)
     assert log.name == f"{name}_seed5"
-    write_folder(log, tmp_path / log.name)
-    assert_same_log(log, read_folder(tmp_path / log.name))
+    log.write(tmp_path / log.name)
+    assert_same_log(log, Log.read(tmp_path / log.name))
 
 
 def test_simulate_starts_at_the_origin_with_sightings_and_odometry_from_step_one(
@@ -205,8 +205,8 @@ def test_simulate_ticks_roll_over_and_give_the_way_back(paper_room: Scenario, tm
     tick_m = 2.0 * math.pi * 0.05 / 2000.0
     assert abs(np.diff(log.odometry.a)).max() > 2048.0  # it did roll over
     np.testing.assert_allclose(np.cumsum(ticks) * tick_m, np.cumsum(drive.left_m), atol=1.001 * tick_m)
-    write_folder(log, tmp_path)
-    assert_same_arrays(log.odometry, read_folder(tmp_path).odometry)
+    log.write(tmp_path)
+    assert_same_arrays(log.odometry, Log.read(tmp_path).odometry)
 
 
 def test_simulate_delay_shifts_the_stamps_and_drops_what_comes_too_late(short_room: Scenario) -> None:

@@ -1,0 +1,160 @@
+"""What the package offers beside `Slam` and `Log`: make, check and run a log, and look at the run.
+
+Thin over `world`, `logcheck`, `runs`, `evaluation` and `view`, and with the words of the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bslam.commands.drawing import room, series
+from bslam.commands.report import table
+from bslam.core.slam import Slam
+from bslam.errors import BslamError, did_you_mean
+from bslam.evaluation.metrics import Evaluation, evaluate, summarise
+from bslam.evaluation.trace import Trace
+from bslam.log import Log
+from bslam.logcheck.check import check_folder
+from bslam.logcheck.finding import Report
+from bslam.options import Number, RunOptions
+from bslam.runs.runner import run_log
+from bslam.runs.sources import options_for, what_it_says
+from bslam.view.room import draw_room_in
+from bslam.view.series import draw_run_in
+from bslam.view.style import new_figure
+from bslam.world.simulate import load_scenario
+from bslam.world.simulate import simulate as simulate_scenario
+
+
+class RunWords(TypedDict, total=False):
+    """How a log is run, as options of `bslam replay csv`; None, or left out: by what the log tells."""
+
+    observation: str | None
+    """ "distance" or "direction"."""
+    association: str | None
+    """ "known", "known:RATE" (so many identities replaced), "mahalanobis", "svm", ..."""
+    filter: str | None
+    """ "standard", "invariant" or "smoother"."""
+    motion: str
+    presets: tuple[str, ...]
+    velocity_states: bool | None
+    noise: str | None
+    sigma_mps: float | None
+    """Wheel-speed sigma told to the filter, m/s."""
+    parameters: Mapping[str, Number]
+    """Settings of the core by name: `Slam.parameters()` lists them. They win over all else."""
+    known_map: bool
+    """The log's true beacons are given to the filter."""
+    kept_map: str | None
+    """Path of a map to start in, at a place that nobody knows."""
+    frozen: bool
+    recovery: str | None
+    align: str | None
+    """ "none", "rigid" or "similarity", of the estimate to the truth."""
+    seed: int
+    """Of what "known:RATE" replaces."""
+    real: str
+    target: str
+    """ "host", "qemu:BOARD" or "serial:DEVICE"."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A log that was run: what the filter said, and how good that was.
+
+    trace: poses (n + 1, 3), covariances (n + 1, 3, 3), map. errors: against the truth, rows as in the trace;
+    None where the log has neither truth nor true beacons. Its text is the line that the command prints.
+    """
+
+    log: Log
+    options: RunOptions
+    trace: Trace
+    errors: Evaluation | None
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The run's entry of summary.json: keys as in docs/CLI.md, without figures that nobody knows."""
+        return summarise(self.log, self.trace, self.options, self.errors)
+
+    def __str__(self) -> str:
+        entry = self.summary | {"name": self.log.name}
+        return "\n".join([table([entry]), *entry["notes"], *entry["problems"]])
+
+
+def simulate(
+    scenario: str | Path, seed: int = 0, *, sigma_mps: float | None = None, noise: str | None = None
+) -> Log:
+    """A drive in a made-up world, with truth.
+
+    scenario: a name ("paper_room") or the path of a TOML file. sigma_mps: of each wheel's speed; noise:
+    "speedometer" (the reading errs) or "actuation" (the wheel does); None: as the scenario has it. Raises
+    BslamError for what is not allowed.
+    """
+    return simulate_scenario(load_scenario(scenario), seed, sigma_mps, noise)
+
+
+def check(log: Log) -> Report:
+    """What `bslam check` says of a log, which prints as the command does. See `Log.check`."""
+    with TemporaryDirectory() as place:
+        folder = Path(place) / "log"
+        log.write(folder)
+        try:
+            report = check_folder(folder)
+        except BslamError as error:
+            raise BslamError(str(error).replace(str(folder), log.name)) from error
+    return replace(report, name=log.name)
+
+
+def run(log: Log, **words: Unpack[RunWords]) -> Run:
+    """Run the filter over a log, as `bslam replay csv` does with options of these names.
+
+    Raises BslamError for what is no option, or no value of one.
+    """
+    for word in words:
+        if word not in RunWords.__annotations__:
+            allowed = ", ".join(RunWords.__annotations__)
+            near = did_you_mean(word, [*RunWords.__annotations__]) or _perhaps_a_setting(word)
+            raise BslamError(f"option {word!r} does not exist; allowed: {allowed}{near}")
+    given: dict[str, Any] = {**words, "sensor": "recorded", "map_align": "rigid"}
+    parameters = given.setdefault("parameters", {})
+    if not isinstance(parameters, Mapping):
+        raise BslamError(f"parameters {parameters!r}: allowed is a mapping, names to numbers")
+    given["parameters"] = tuple(parameters.items())
+    options = options_for(what_it_says(log), given)
+    trace = run_log(log, options)
+    return Run(log, options, trace, evaluate(log, trace, options))
+
+
+def _perhaps_a_setting(word: str) -> str:
+    names = Slam.defaults()
+    return f"; did you mean parameters={{{word!r}: ...}}?" if word in names else did_you_mean(word, names)
+
+
+def plot(run: Run) -> Figure:
+    """Path and map with 2-sigma ellipses beside, where there is a truth, position error and NEES over time.
+
+    A matplotlib figure, which a notebook shows; `plot(run).savefig("run.png")` keeps it. Map and truth are
+    aligned as the path is; ellipses stand relative to the start, so that none is drawn after an alignment.
+    """
+    if not isinstance(run, Run):
+        raise BslamError(f"plot of {type(run).__name__}; allowed: a Run, as log.run() gives it")
+    log, trace = run.log, run.trace
+    errors = evaluate(log, trace, replace(run.options, map_align=None))
+    picture = room(log.name, log, trace, errors, walls_m=np.empty((0, 4)))
+    if errors is None or not np.isfinite(errors.error_m).any():
+        figure = new_figure(8.0, 7.5)
+        draw_room_in(figure, picture, legend_columns=4)
+        return figure
+    figure = new_figure(15.0, 7.5)
+    halves = figure.add_gridspec(1, 2)
+    draw_room_in(figure.add_subfigure(halves[0]), picture, legend_columns=4)
+    draw_run_in(figure.add_subfigure(halves[1]), series("", errors))
+    return figure
