@@ -148,13 +148,15 @@ def plot(run: Run) -> Figure:
         raise BslamError(f"plot of {type(run).__name__}; allowed: a Run, as log.run() gives it")
     log, trace = run.log, run.trace
     errors = evaluate(log, trace, replace(run.options, map_align=None))
-    picture = room(log.name, log, trace, errors, walls_m=np.empty((0, 4)))
-    if errors is None or not np.isfinite(errors.error_m).any():
-        figure = new_figure(8.0, 7.5)
-        draw_room_in(figure, picture, legend_columns=4)
-        return figure
-    figure = new_figure(15.0, 7.5)
-    halves = figure.add_gridspec(1, 2)
-    draw_room_in(figure.add_subfigure(halves[0]), picture, legend_columns=4)
-    draw_run_in(figure.add_subfigure(halves[1]), series("", errors))
+    has_errors = errors is not None and bool(np.isfinite(errors.error_m).any())
+    figure = new_figure(15.0 if has_errors else 8.0, 7.5)
+    grid = figure.add_gridspec(2, 2 if has_errors else 1)
+    map_axes = figure.add_subplot(grid[:, 0])
+    draw_room_in(map_axes, room(log.name, log, trace, errors, walls_m=np.empty((0, 4))))
+    named = map_axes.get_legend_handles_labels()
+    figure.legend(*named, loc="outside lower left", ncols=6, fontsize=8, frameon=False)
+    if errors is not None and has_errors:
+        error_axes = figure.add_subplot(grid[0, 1])
+        nees_axes = figure.add_subplot(grid[1, 1], sharex=error_axes)
+        draw_run_in(error_axes, nees_axes, series("against the truth", errors))
     return figure

@@ -49,13 +49,13 @@ def draw_room(room: Room) -> Figure:
     width_m, height_m = high_m - low_m
     width_in = float(np.clip(9.0 * np.sqrt(width_m / height_m), 6.5, 11.0))
     figure = new_figure(width_in, float(np.clip(width_in * height_m / width_m, 4.0, 11.0)) + 0.8)
-    draw_room_in(figure, room, legend_columns=6)
+    draw_room_in(figure.add_subplot(), room)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     return figure
 
 
-def draw_room_in(figure: Any, room: Room, legend_columns: int) -> None:
-    """The same in an empty figure, or in a part of one."""
-    axes = figure.add_subplot()
+def draw_room_in(axes: Any, room: Room) -> None:
+    """The same, but for the legend, in axes of any figure."""
     low_m, high_m = _extent(room)
     for x1, y1, x2, y2 in room.walls_m:
         axes.plot([x1, x2], [y1, y2], color=WALL, linewidth=3, solid_capstyle="round", zorder=2)
@@ -74,7 +74,6 @@ def draw_room_in(figure: Any, room: Room, legend_columns: int) -> None:
     axes.set_ylim(low_m[1], high_m[1])
     tidy(axes, "x, m", "y, m")
     axes.set_title(room.title, fontsize=11)
-    figure.legend(loc="outside lower center", ncols=legend_columns, fontsize=8, frameon=False)
 
 
 def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:
@@ -138,11 +137,15 @@ def _extent(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         true.append(room.truth_m[np.isfinite(room.truth_m[:, 0])])
     if room.beacons is not None:
         true.append(np.column_stack([room.beacons.x_m, room.beacons.y_m]))
+    shown_m = room.estimate_m
+    if room.beacons is None:  # else the true ones are what is to be seen
+        mapped_m = [(one.x_m, one.y_m) for one in room.mapped if one.confirmed]
+        shown_m = np.concatenate([shown_m, np.reshape(mapped_m, (-1, 2))])
     points = np.concatenate(true)
     if len(points) == 0:
-        points = room.estimate_m
+        points = shown_m
     low_m, high_m = points.min(axis=0), points.max(axis=0)
     margin_m = _LOST_MARGIN * max(float(np.max(high_m - low_m)), 1.0)
-    low_m = np.maximum(np.minimum(low_m, room.estimate_m.min(axis=0)), low_m - margin_m)
-    high_m = np.minimum(np.maximum(high_m, room.estimate_m.max(axis=0)), high_m + margin_m)
+    low_m = np.maximum(np.minimum(low_m, shown_m.min(axis=0)), low_m - margin_m)
+    high_m = np.minimum(np.maximum(high_m, shown_m.max(axis=0)), high_m + margin_m)
     return low_m - 0.4, high_m + 0.4

@@ -31,13 +31,12 @@ class Series:
 def draw_run(series: Series) -> Figure:
     """Error and NEES, one above the other."""
     figure = new_figure(9.5, 6.0)
-    draw_run_in(figure, series)
+    draw_run_in(*figure.subplots(2, 1, sharex=True), series)
     return figure
 
 
-def draw_run_in(figure: Any, series: Series) -> None:
-    """The same in an empty figure, or in a part of one."""
-    error_axes, nees_axes = figure.subplots(2, 1, sharex=True)
+def draw_run_in(error_axes: Any, nees_axes: Any, series: Series) -> None:
+    """The same in axes of any figure."""
     draw_error(error_axes, series)
     draw_nees(nees_axes, series)
     error_axes.set_xlabel("")
