@@ -89,7 +89,7 @@ def macros_of(real: str, beacons_max: int) -> Macros:
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
         ("BSLAM_RAYS_MAX", str(beacons_max)),
-        ("BSLAM_SIGHTINGS_MAX", str(min(max(64, beacons_max + 16), 250))),  # every beacon, and some clutter
+        ("BSLAM_SIGHTINGS_MAX", str(BUILDS["sightings_max"](beacons_max))),
         ("BSLAM_HISTORY_MAX", "128"),
         ("BSLAM_APPEARANCE", "1"),
         ("BSLAM_SMOOTHER", "1"),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from numbers import Real
 from typing import Any, Final
 
@@ -14,11 +15,27 @@ NOT_MAPPABLE: Final = 255
 """BSLAM_CLASS_NOT_MAPPABLE."""
 INT32: Final = (-(2**31), 2**31 - 1)
 INT64: Final = (-(2**63), 2**63 - 1)
-_WHOLE: Final = {"label": INT32, "beacon_class": (0, NOT_MAPPABLE)}
+_WHOLE: Final = {"label": (-1, INT32[1]), "beacon_class": (0, NOT_MAPPABLE)}
 _FIELDS: Final = (
     *("bearing_rad", "range_m", "label", "beacon_class"),
     *("bearing_sd_rad", "range_sd_m", "range_scale_sd", "score"),
 )
+
+_TURN: Final = 2.0 * math.pi
+# What C allows (bslam.h), in words and as a test: C refuses, and these say which field it was.
+_ALLOWED: Final[dict[str, tuple[str, Callable[[float], bool]]]] = {
+    "bearing_rad": ("radians from -2 pi to 2 pi", lambda value: abs(value) <= _TURN),
+    "range_m": (
+        "0.001 to 10000 m, or NaN for none",
+        lambda value: 1e-3 <= value <= 1e4,
+    ),
+    "label": ("a whole number from 0, or -1 for no identity", lambda value: value >= -1),
+    "beacon_class": ("a whole number from 1 to 254, or 0 for none", lambda value: True),
+    "bearing_sd_rad": ("0 or 1e-5 to pi", lambda value: value == 0.0 or 1e-5 <= value <= math.pi),
+    "range_sd_m": ("0 or 0.001 to 10000 m", lambda value: value == 0.0 or 1e-3 <= value <= 1e4),
+    "range_scale_sd": ("0 to 1", lambda value: 0.0 <= value <= 1.0),
+    "score": ("-1e6 to 1e6", lambda value: abs(value) <= 1e6),
+}
 
 Row = tuple[float, float, int, int, float, float, float, float]
 """A sighting, as `_FIELDS` has it."""
@@ -33,14 +50,24 @@ def whole(value: Any, what: str, limits: tuple[int, int] = INT64) -> int:
     raise BslamError(f"{what} {value!r}: allowed is a whole number from {low} to {high}")
 
 
-def number(value: Any, what: str) -> float:
-    """Any number; whether it is finite, the core looks. Raises BslamError."""
+def number(value: Any, what: str, allowed: str = "a number") -> float:
+    """Any number; whether it is finite, the core looks. Raises BslamError with what is `allowed`."""
     if isinstance(value, Real):
         try:
             return float(value)
         except OverflowError:
             pass
-    raise BslamError(f"{what} {value!r}: allowed is a number")
+    raise BslamError(f"{what} {value!r}: allowed is {allowed}")
+
+
+def refused_field(row: Row) -> str:
+    """Of a sighting that C refuses, the field that is why, and what is allowed there."""
+    for name, value in zip(_FIELDS, row, strict=True):
+        allowed, holds = _ALLOWED[name]
+        is_read = not (name.startswith("range_") and math.isnan(row[1]))
+        if is_read and not holds(value):
+            return f"{name} {value}: allowed is {allowed}"
+    return "signature: allowed are finite numbers"
 
 
 def frame_rows(where: str, **columns: Sequence[Any] | None) -> list[Row]:

@@ -1,9 +1,10 @@
 """The C library 1:1: one `Library` is one build. Nothing else in the package touches ffi."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from itertools import count
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,10 +34,11 @@ class Library:
         self.map_faults = self.enum_names("bslam_map_fault_t", "BSLAM_MAP_", space=" ")
         _answer_callbacks(self.ffi)
 
-    def ensure(self, status: int, message: str) -> None:
-        """Raises CoreError unless status is BSLAM_OK."""
+    def ensure(self, status: int, message: str, allowed: Mapping[str, str] = MappingProxyType({})) -> None:
+        """Raises CoreError unless status is BSLAM_OK. allowed: words on what is, by the status's name."""
         if status != self.lib.BSLAM_OK:
-            raise CoreError(self.text(self.lib.bslam_status_name(status)), message)
+            name = self.text(self.lib.bslam_status_name(status))
+            raise CoreError(name, f"{message}: allowed is {allowed[name]}" if name in allowed else message)
 
     def settings_infos(self) -> Iterator[Any]:
         """Every line of the tables of settings."""

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core.appearance import SIGNATURE_SIZE, encode
-from bslam.core.inputs import INT32, checked_rows, frame_rows, number, whole
+from bslam.core.builds import sightings_max
+from bslam.core.inputs import INT32, checked_rows, frame_rows, number, refused_field, whole
 from bslam.core.raw import Flash, library
 from bslam.errors import BslamError, did_you_mean
 
@@ -17,6 +18,14 @@ BY_APPEARANCE = (3, 6, 7, 8)
 _TICKS = (0, 2**32 - 1)
 _NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE
 _BESIDE_SPEEDS = "contradicts velocity_states = 1: allowed beside it is"
+_FINITE = {"BSLAM_E_NOT_FINITE": "finite numbers"}
+_ODOMETRY_ALLOWED = {
+    "BSLAM_E_TIME": "a stamp in microseconds above the one before, by up to 4 s (else resume_odometry first)",
+    "BSLAM_E_RANGE": "counts below counter_modulus, and a gyro's turn up to 100 rad a reading",
+    **_FINITE,
+}
+_WITHIN = "a stamp within the last readings of odometry"
+_DOUBT = {"BSLAM_E_RANGE": "sd from 0 to 30 m and from 0 to 3.2 rad"}
 # What is wrong with a parameter that is within its range.
 _CONTRADICTIONS = {
     "scale_states": f"{_BESIDE_SPEEDS} 0",
@@ -119,10 +128,11 @@ class Slam:
                 raise BslamError(
                     f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}{near}"
                 )
-            parameter, value = self._table[name], number(value, f"parameter {name} =")
+            parameter = self._table[name]
+            kind = "a whole number" if parameter.is_integer else "a number"
+            allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"
+            value = number(value, f"parameter {name} =", allowed)
             if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
-                kind = "a whole number" if parameter.is_integer else "a number"
-                allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"
                 raise BslamError(f"parameter {name} = {value}: allowed is {allowed}")
             setattr(self._settings, name, int(value) if parameter.is_integer else value)
 
@@ -151,7 +161,7 @@ class Slam:
         """
         doubt = _doubt(position_sd_m, heading_sd_rad)
         status = self._lib.bslam_restart(self._robot, *doubt)
-        self._raw.ensure(status, f"restart with sd {position_sd_m} m, {heading_sd_rad} rad")
+        self._raw.ensure(status, f"restart with sd {position_sd_m} m, {heading_sd_rad} rad", _DOUBT)
 
     @staticmethod
     def parameters(real: str = "float") -> list[Parameter]:
@@ -221,7 +231,10 @@ class Slam:
         reading.gyro_sd_radps = number(gyro_sd_radps, f"{where}: gyro_sd_radps")
         status = self._lib.bslam_odometry(self._robot, reading)
         if status:
-            self._raw.ensure(status, f"{where} ({name_a} {a}, {name_b} {b})")
+            gyro = "" if gyro_radps is None else f", gyro_radps {gyro_radps}"
+            speed = f"a wheel's speed up to speed_max_mps = {self._settings.speed_max_mps:g} m/s"
+            allowed = {**_ODOMETRY_ALLOWED, "BSLAM_E_JUMP": speed}
+            self._raw.ensure(status, f"{where} ({name_a} {a}, {name_b} {b}{gyro})", allowed)
 
     def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:
         """After an interruption: the next reading starts the clock, and the pose is this much more doubtful.
@@ -229,7 +242,7 @@ class Slam:
         Raises CoreError if a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
         status = self._lib.bslam_resume_odometry(self._robot, *_doubt(position_sd_m, heading_sd_rad))
-        self._raw.ensure(status, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad")
+        self._raw.ensure(status, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad", _DOUBT)
 
     def sightings(
         self,
@@ -277,8 +290,11 @@ class Slam:
         status = self._lib.bslam_sightings(self._robot, at_us, array, len(rows))
         if status:
             bad = self._lib.bslam_health(self._robot).bad_sighting
-            which = f", sighting {bad} {rows[bad]}" if bad >= 0 else f", {len(rows)} sightings"
-            self._raw.ensure(status, f"{where}{which}")
+            which = f"sighting {bad}: {refused_field(rows[bad])}" if bad >= 0 else f"{len(rows)} sightings"
+            most, ahead_us = sightings_max(self._raw.beacons_max), self._settings.ahead_max_us
+            time = f"{_WITHIN}, at most ahead_max_us = {ahead_us} us after it, and no frame twice"
+            allowed = {"BSLAM_E_COUNT": f"up to {most}", "BSLAM_E_TIME": time}
+            self._raw.ensure(status, f"{where}, {which}", allowed)
         accounts = self._lib.bslam_results(self._robot, self._ffi.new("int *"))
         return [self._account(accounts[i]) for i in range(len(rows))]
 
@@ -300,7 +316,7 @@ class Slam:
         """The pose at a time within the history. Raises CoreError outside it."""
         status = self._lib.bslam_pose_at(self._robot, whole(time_us, "pose at time_us"), self._pose)
         if status:
-            self._raw.ensure(status, f"pose at {time_us} us")
+            self._raw.ensure(status, f"pose at {time_us} us", {"BSLAM_E_TIME": _WITHIN})
         return self._pose.x_m, self._pose.y_m, self._pose.theta_rad
 
     def pose_covariance_lower(self) -> tuple[float, ...]:
@@ -342,7 +358,8 @@ class Slam:
         place = (number(x_m, "known beacon: x_m"), number(y_m, "known beacon: y_m"))
         identity = whole(label, "known beacon: label", INT32)
         status = self._lib.bslam_add_known_beacon(self._robot, identity, *place)
-        self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})")
+        allowed = {"BSLAM_E_RANGE": "a label from 0, and a place within 10 km", **_FINITE}
+        self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})", allowed)
 
     def set_pose(
         self, x_m: float, y_m: float, theta_rad: float, position_sd_m: float, heading_sd_rad: float
@@ -355,7 +372,7 @@ class Slam:
         pose = self._ffi.new("bslam_pose_t *", tuple(number(one, f"pose: {name}") for name, one in values))
         status = self._lib.bslam_set_pose(self._robot, pose, *_doubt(position_sd_m, heading_sd_rad))
         doubt = f"sd {position_sd_m} m, {heading_sd_rad} rad"
-        self._raw.ensure(status, f"pose ({x_m}, {y_m}, {theta_rad}) with {doubt}")
+        self._raw.ensure(status, f"pose ({x_m}, {y_m}, {theta_rad}) with {doubt}", _DOUBT | _FINITE)
 
     def save_map(self) -> bytes:
         """The confirmed beacons with covariance, and the classifiers, as docs/MAP.md has it."""
@@ -414,7 +431,8 @@ class Slam:
     def remove_beacon(self, uid: int) -> None:
         """Takes a beacon out of the map. Raises CoreError if there is none."""
         number_of_it = whole(uid, "beacon: uid", (0, 2**32 - 1))
-        self._raw.ensure(self._lib.bslam_remove_beacon(self._robot, number_of_it), f"beacon {uid}")
+        status = self._lib.bslam_remove_beacon(self._robot, number_of_it)
+        self._raw.ensure(status, f"beacon {uid}", {"BSLAM_E_NO_BEACON": "a uid of beacons()"})
 
     def counters(self) -> dict[str, int]:
         """Never-decreasing counts by the names in bslam_counters_t; of what is switched off they are 0."""

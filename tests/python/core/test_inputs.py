@@ -94,7 +94,7 @@ def test_what_is_not_whole_is_refused_and_changes_nothing(call: Callable[..., ob
         (lambda s: s.sightings(2**63, *ONE), f"frame at {2**63} us: time_us {2**63}: allowed is"),
         (
             lambda s: s.sightings(40_000, [0.1, 0.2], [2.0, 2.0], [3, "door"], [True, True]),
-            "frame at 40000 us, sighting 1: label 'door': allowed is a whole number from -2147483648 to",
+            "frame at 40000 us, sighting 1: label 'door': allowed is a whole number from -1 to 2147483647",
         ),
         (lambda s: s.sightings(40_000, [0.1], [2.0], [2**40], [True]), f"sighting 0: label {2**40}: allowed"),
         (
