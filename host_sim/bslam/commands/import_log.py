@@ -1,0 +1,162 @@
+"""`bslam import`: logs of other systems as log folders."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from bslam.errors import BslamError
+from bslam.log import WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot, write_folder
+from bslam.parsing.settings import number, parse_table
+from bslam.ros2.importer import Request, import_bag
+from bslam.ros2.tags import HELP, SIDE_M, TagSizes, read_tag_sizes
+
+SUMMARY = "make a log folder of a bag of ROS 2: odometry, markers, gyro, ground truth"
+EXAMPLES = f"""examples:
+  bslam import ros2 my_bag --odometry /odom --detections /apriltag/detections --tag-size 0.16
+  bslam import ros2 my_bag --detections /aruco_markers --imu /imu --out my_drive
+  bslam import ros2 drive.mcap --joints /joint_states --wheel-radius 0.033 --wheelbase 0.16
+  bslam import ros2 drive.mcap --detections /tf --truth /mocap/pose --mount 0.1,0,0
+
+BAG is a rosbag2 folder, FILE.mcap or FILE.db3; `pip install rosbags` brings what reads it, no ROS is needed.
+Markers: AprilTagDetectionArray (apriltag_msgs, Isaac ROS), ArucoMarkers, ArucoDetection, MarkerArray
+(aruco_msgs), Detection3DArray, or /tf with frames such as tag36h11:5. A topic that is not named is the only
+one of its kind. Where the camera sits comes from /tf_static. Stamps are those of the headers.
+--tags: {HELP}.
+Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
+
+_LOG_FILES = ("odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml")
+_OTHERS = tuple(f"{name}.gz" for name in _LOG_FILES[:4]) + ("signatures.npy", "seeds.npy")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("format", choices=["ros2"], help="what the log is of")
+    parser.add_argument("bag", type=Path, metavar="BAG", help="rosbag2 folder, FILE.mcap or FILE.db3")
+    parser.add_argument("--odometry", metavar="TOPIC", help="nav_msgs/Odometry: poses become wheel travel")
+    parser.add_argument("--detections", metavar="TOPIC", help="the markers")
+    parser.add_argument("--joints", metavar="TOPIC", help="sensor_msgs/JointState in place of --odometry")
+    parser.add_argument("--left-joint", metavar="NAME", help="default: the one with 'left' and 'wheel'")
+    parser.add_argument("--right-joint", metavar="NAME", help="default: the one with 'right' and 'wheel'")
+    parser.add_argument("--wheel-radius", type=float, metavar="METRES", help="of --joints")
+    parser.add_argument("--wheelbase", type=float, metavar="METRES", help="distance between the wheels")
+    parser.add_argument("--imu", metavar="TOPIC", help="sensor_msgs/Imu: the gyro's turn rate")
+    parser.add_argument(
+        "--truth", metavar="TOPIC[:FRAME]", help="true poses: PoseStamped, Odometry, or a child frame of /tf"
+    )
+    parser.add_argument("--tags", type=Path, metavar="FILE", help="sizes of tags, .toml or .csv")
+    parser.add_argument("--tag-size", type=float, metavar="METRES", help="side of every tag's black square")
+    parser.add_argument("--camera-info", metavar="TOPIC", help="default: that of the markers' frame")
+    parser.add_argument("--image", choices=["raw", "rectified"], help="what the corners of AprilTags are of")
+    parser.add_argument("--pixel-sd", type=float, default=0.5, metavar="PX", help="noise of corners (0.5)")
+    parser.add_argument("--base", metavar="FRAME", help="the robot's frame; default: the odometry's child")
+    parser.add_argument("--mount", metavar="X,Y,YAW", help="the camera, m and rad, in place of /tf_static")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="a key of robot.toml; may be repeated"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the log folder (default: out/import/BAG)")
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    out = arguments.out or Path("out/import") / arguments.bag.stem
+    _require_place(out)
+    imported = import_bag(arguments.bag, _request(arguments))
+    _write(imported.log, out)
+    for line in imported.said:
+        print(line)
+    print(f"log in {out}; next: bslam check {out}; bslam replay csv {out}")
+    return 0
+
+
+def _request(arguments: argparse.Namespace) -> Request:
+    pixel_sd, radius = number(1e-3, 100.0).convert(arguments.pixel_sd, "--pixel-sd"), arguments.wheel_radius
+    return Request(
+        odometry=arguments.odometry,
+        detections=arguments.detections,
+        joints=arguments.joints,
+        left_joint=arguments.left_joint,
+        right_joint=arguments.right_joint,
+        wheel_radius_m=None if radius is None else WHEEL_RADIUS_M.convert(radius, "--wheel-radius"),
+        imu=arguments.imu,
+        truth=arguments.truth,
+        camera_info=arguments.camera_info,
+        rectified=None if arguments.image is None else arguments.image == "rectified",
+        sizes=_sizes(arguments),
+        pixel_sd=pixel_sd,
+        base=arguments.base,
+        mount=None if arguments.mount is None else _mount(arguments.mount),
+        robot=_robot_keys(arguments),
+    )
+
+
+def _sizes(arguments: argparse.Namespace) -> TagSizes | None:
+    if arguments.tags is None and arguments.tag_size is None:
+        return None
+    table = TagSizes({}) if arguments.tags is None else read_tag_sizes(arguments.tags)
+    if arguments.tag_size is None:
+        return table
+    return TagSizes(table.side_m, SIDE_M.convert(arguments.tag_size, "--tag-size"))
+
+
+def _mount(text: str) -> tuple[float, float, float]:
+    limits = (number(-100.0, 100.0), number(-100.0, 100.0), number(-3.2, 3.2))
+    try:
+        values = [float(word) for word in text.split(",")]
+        x_m, y_m, yaw_rad = (
+            rule.convert(one, f"--mount {text}") for rule, one in zip(limits, values, strict=True)
+        )
+    except ValueError:
+        raise BslamError(f"--mount {text!r}: allowed: X_M,Y_M,YAW_RAD, as 0.1,0,0") from None
+    return x_m, y_m, yaw_rad
+
+
+def _robot_keys(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Keys of robot.toml that the command line gives, each checked."""
+    keys: dict[str, Any] = {}
+    for text in arguments.set:
+        name, equals, value = text.partition("=")
+        try:
+            keys |= tomllib.loads(f"{name} = {value}") if equals else {}
+        except tomllib.TOMLDecodeError:
+            equals = ""
+        if not equals:
+            raise BslamError(f"--set {text!r}: allowed: KEY=VALUE, as wheel_speed_sigma_mps=0.02")
+    if arguments.wheelbase is not None:
+        keys["wheelbase_m"] = WHEELBASE_M.convert(arguments.wheelbase, "--wheelbase")
+    placeholder = {one: 1 for one in ("wheelbase_m", "step_us", "range_sigma_scale_m")}
+    noise = ("wheel_speed_sigma_mps", "field_of_view_rad", "bearing_sigma_rad", "range_sigma_fraction")
+    parse_table(Robot, {**placeholder, **dict.fromkeys(noise, 1.0), **keys}, "--set")
+    return keys
+
+
+def _require_place(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise BslamError(f"--out {out}: there is a file of that name; allowed: a folder")
+
+
+def _write(log: Log, out: Path) -> None:
+    """The log folder, whole or not at all: in a folder that is there, its log files are replaced."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+        try:
+            write_folder(log, made)
+            made.chmod(0o755)  # mkdtemp makes it private
+            if not out.exists():
+                made.rename(out)
+                return
+            for name in _LOG_FILES + _OTHERS:
+                if (made / name).exists():
+                    os.replace(made / name, out / name)
+                else:
+                    (out / name).unlink(missing_ok=True)
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+    except OSError as error:
+        raise BslamError(f"--out {out}: cannot be written: {error}; allowed: a place to write to") from error

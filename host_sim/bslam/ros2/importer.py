@@ -1,0 +1,454 @@
+"""A bag of ROS 2 as a log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+from bslam.log import Log, Odometry, Robot, Sightings, Truth
+from bslam.parsing.settings import parse_table
+from bslam.ros2.bag import Bag
+from bslam.ros2.geometry import DISTORTIONS, Camera, Mount, Transform, pose_in
+from bslam.ros2.messages import (
+    CAMERA_INFO,
+    CORNERS,
+    DETECTIONS,
+    IMU,
+    JOINTS,
+    ODOMETRY,
+    POSES,
+    TF,
+    Frame,
+    PlanarPose,
+    camera_of,
+    frames_of,
+    poses_of,
+    transforms_of,
+)
+from bslam.ros2.sightings import BEARING_LEFT_RAD, RANGE_LEFT, Markers, sightings_of
+from bslam.ros2.stamps import in_order, without_repeats
+from bslam.ros2.tags import TagSizes
+from bslam.ros2.wheels import Gyro, Joints, Poses, Travel, gyro_means, travel_of_joints, travel_of_poses
+
+TF_STATIC: Final = "/tf_static"
+WHEELBASE_M: Final = 0.3
+# What a wheeled robot and a detector of tags have about; whoever knows better says so.
+GUESSES: Final[Mapping[str, Any]] = {
+    "wheelbase_m": WHEELBASE_M,
+    "wheel_speed_sigma_mps": 0.05,
+    "wheel_noise": "actuation",
+    "bearing_sigma_rad": 0.02,
+    "range_sigma_fraction": 0.03,
+    "range_sigma_scale_m": math.inf,
+    "range_sigma_floor_m": 0.02,
+}
+_NOISE_OF_SIGHTINGS: Final = (
+    "bearing_sigma_rad",
+    "range_sigma_fraction",
+    "range_sigma_scale_m",
+    "range_sigma_floor_m",
+)
+_ROOM_AT_THE_EDGES: Final = 1.05  # of a field of view that is only known by what was seen
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to take from a bag. A topic of None: the only one of its kind, if there is one."""
+
+    odometry: str | None = None
+    detections: str | None = None
+    joints: str | None = None
+    left_joint: str | None = None
+    right_joint: str | None = None
+    wheel_radius_m: float | None = None
+    imu: str | None = None
+    truth: str | None = None  # TOPIC, or TOPIC:CHILD_FRAME for a TFMessage
+    camera_info: str | None = None
+    rectified: bool | None = None  # whether corners are of the rectified image; None: nobody said
+    sizes: TagSizes | None = None
+    pixel_sd: float = 0.5
+    base: str | None = None  # the robot's frame; None: the child frame of the odometry
+    mount: tuple[float, float, float] | None = None  # x, y, yaw of the camera; None: from /tf_static
+    robot: Mapping[str, Any] = field(default_factory=dict)  # keys of robot.toml
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A log, and what to say of how it was made, a line each."""
+
+    log: Log
+    said: tuple[str, ...]
+
+
+@dataclass
+class _Read:
+    """All that one pass over the bag gives."""
+
+    counts: dict[str, int] = field(default_factory=dict)
+    poses: Poses = field(default_factory=Poses)
+    child: str = ""
+    joints: Joints = field(default_factory=lambda: Joints(None, None))
+    gyro: Gyro = field(default_factory=Gyro)
+    frames: list[Frame] = field(default_factory=list)
+    truth: list[PlanarPose] = field(default_factory=list)
+    cameras: dict[str, Any] = field(default_factory=dict)  # the first CameraInfo of each topic
+    tree: dict[str, tuple[str, Transform]] = field(default_factory=dict)
+
+
+Taker = Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """The topic and its type for each part; None: not asked for, or not there."""
+
+    detections: tuple[str, str]
+    odometry: tuple[str, str] | None
+    joints: tuple[str, str] | None
+    imu: tuple[str, str] | None
+    truth: tuple[str, str] | None
+    truth_frame: str
+    cameras: tuple[str, ...]
+
+    @property
+    def motion(self) -> str:
+        """The topic that the wheels' travel is from."""
+        chosen = self.joints or self.odometry
+        assert chosen is not None
+        return chosen[0]
+
+
+def import_bag(path: Path, request: Request) -> Imported:
+    """Read a bag. Raises BslamError that says what is missing or wrong, and what is allowed."""
+    notes: list[str] = []
+    with Bag(path) as bag:
+        chosen = _choose(bag, request)
+        read = _read(bag, chosen, request)
+        kinds = dict(bag.topics)
+    travel = _travel(read, chosen, request, notes)
+    gyro_radps, gyro_said = _gyro(read, chosen, request, travel, notes)
+    markers = _markers(read, chosen, request, path)
+    sightings, words = sightings_of(read.frames, markers, chosen.detections[0], notes)
+    sightings = _within(sightings, travel, chosen, notes)
+    robot, guessed = _robot(request, travel, sightings, markers, gyro_said)
+    odometry = travel.wheels(robot.wheelbase_m, gyro_radps)
+    truth = _truth(read, chosen, travel, notes)
+    log = Log(path.stem, odometry, sightings, truth, None, robot, words=words)
+    told = _told(read, chosen, kinds, log, markers)
+    return Imported(log, (*told, *guessed, *(f"note: {one}" for one in notes)))
+
+
+# --- topics, and one pass over the bag ----------------------------------------------------------------------
+
+
+def _choose(bag: Bag, request: Request) -> _Chosen:
+    detections = bag.topic_of("--detections", request.detections, _without_tf(bag, request))
+    joints = bag.topic_of("--joints", request.joints, [JOINTS]) if request.joints else None
+    if joints is None or request.odometry:
+        odometry = bag.topic_of("--odometry", request.odometry, [ODOMETRY])
+    else:
+        odometry = None
+    if odometry is None and joints is None:
+        raise BslamError(
+            f"{bag.path}: no topic of type {ODOMETRY}; allowed: --odometry TOPIC or --joints TOPIC of "
+            f"{bag.listing([ODOMETRY, JOINTS])}"
+        )
+    if detections is None:
+        raise BslamError(
+            f"{bag.path}: no topic of markers; allowed: --detections TOPIC of {bag.listing(list(DETECTIONS))}; "
+            f"types: {', '.join(DETECTIONS)}"
+        )
+    truth, _, truth_frame = (request.truth or "").partition(":")
+    chosen = _Chosen(
+        detections,
+        odometry,
+        joints,
+        bag.topic_of("--imu", request.imu, [IMU]) if request.imu else None,
+        bag.topic_of("--truth", truth, list(POSES)) if truth else None,
+        truth_frame,
+        _camera_topics(bag, request, detections),
+    )
+    if chosen.truth and chosen.truth[1] == TF and not truth_frame:
+        raise BslamError(f"--truth {truth}: which frame of it? allowed: --truth {truth}:CHILD_FRAME")
+    return chosen
+
+
+def _without_tf(bag: Bag, request: Request) -> list[str]:
+    """Types of markers; /tf is in every bag, so it counts only where it is named."""
+    named = request.detections is not None and bag.topics.get(request.detections) == TF
+    return [kind for kind in DETECTIONS if kind != TF or named]
+
+
+def _camera_topics(bag: Bag, request: Request, detections: tuple[str, str]) -> tuple[str, ...]:
+    """The topics of CameraInfo to read: the one named, else all."""
+    if request.camera_info:
+        found = bag.topic_of("--camera-info", request.camera_info, [CAMERA_INFO])
+        return (found[0],) if found else ()
+    there = tuple(name for name, kind in bag.topics.items() if kind == CAMERA_INFO and bag.counts[name])
+    if not there and detections[1] in CORNERS:
+        raise BslamError(
+            f"{bag.path}: {detections[0]} has corners in pixels, and no {CAMERA_INFO} is there; allowed: a bag "
+            "with camera_info, or a topic with poses of the markers"
+        )
+    return there
+
+
+def _read(bag: Bag, chosen: _Chosen, request: Request) -> _Read:
+    read = _Read(joints=Joints(request.left_joint, request.right_joint))
+    takers = _takers(read, chosen)
+    if TF_STATIC in bag.topics:
+        takers.append((TF_STATIC, lambda message: _take_static(read, message)))
+    read.counts = {topic: 0 for topic, _ in takers}
+    for topic, message in bag.messages(sorted(read.counts)):
+        read.counts[topic] += 1
+        for name, take in takers:
+            if name == topic:
+                take(message)
+    for topic, option in ((chosen.motion, "odometry"), (chosen.detections[0], "detections")):
+        if read.counts[topic] == 0:
+            raise BslamError(f"{bag.path}: {topic} ({option}) holds no messages; allowed: a topic with some")
+    return read
+
+
+def _takers(read: _Read, chosen: _Chosen) -> list[tuple[str, Taker]]:
+    """What to do with the messages of each topic."""
+    kind = chosen.detections[1]
+    takers: list[tuple[str, Taker]] = [
+        (chosen.detections[0], lambda message: read.frames.extend(frames_of(kind, message)))
+    ]
+    if chosen.odometry:
+        takers.append((chosen.odometry[0], lambda message: _take_odometry(read, message)))
+    if chosen.joints:
+        takers.append((chosen.joints[0], read.joints.add))
+    if chosen.imu:
+        takers.append((chosen.imu[0], read.gyro.add))
+    if chosen.truth:
+        topic, of_kind = chosen.truth
+        frame = chosen.truth_frame
+        takers.append((topic, lambda message: read.truth.extend(poses_of(of_kind, message, frame))))
+    for camera in chosen.cameras:
+        takers.append((camera, lambda message, camera=camera: read.cameras.setdefault(camera, message)))  # type: ignore[misc]
+    return takers
+
+
+def _take_odometry(read: _Read, message: Any) -> None:
+    read.child = message.child_frame_id
+    read.poses.add(poses_of(ODOMETRY, message)[0], message)
+
+
+def _take_static(read: _Read, message: Any) -> None:
+    for parent, child, pose in transforms_of(message):
+        read.tree[child] = (parent, pose)
+
+
+# --- motion -------------------------------------------------------------------------------------------------
+
+
+def _travel(read: _Read, chosen: _Chosen, request: Request, notes: list[str]) -> Travel:
+    if chosen.joints is None:
+        return travel_of_poses(read.poses, chosen.motion, notes)
+    for option, value in (("--wheel-radius", request.wheel_radius_m), ("--wheelbase", _wheelbase(request))):
+        if value is None:
+            raise BslamError(
+                f"--joints {chosen.motion}: angles become ways by {option} METRES, which is missing"
+            )
+    radius_m, wheelbase_m = float(request.wheel_radius_m or 0.0), float(_wheelbase(request) or 0.0)
+    return travel_of_joints(read.joints, chosen.motion, radius_m, wheelbase_m, notes)
+
+
+def _wheelbase(request: Request) -> float | None:
+    return request.robot.get("wheelbase_m")
+
+
+def _gyro(
+    read: _Read, chosen: _Chosen, request: Request, travel: Travel, notes: list[str]
+) -> tuple[NDArray[np.float64] | None, dict[str, float]]:
+    """Turn rates beside the odometry, and the gyro's noise as a key of robot.toml."""
+    if chosen.imu is None:
+        return None, {}
+    if not read.gyro.stamps_ns:
+        raise BslamError(f"{chosen.imu[0]} (--imu) holds no messages; allowed: a topic with some")
+    base = _base(read, request)
+    pose = pose_in(read.tree, base, read.gyro.frame_id)
+    if pose is None:
+        notes.append(f"{chosen.imu[0]}: no way from {base} to {read.gyro.frame_id}; its z is taken as up")
+        pose = Transform(np.eye(3), np.zeros(3))
+    means, sd = gyro_means(read.gyro, chosen.imu[0], pose, travel.time_us, notes)
+    return means, {"gyro_sigma_radps": sd}
+
+
+def _base(read: _Read, request: Request) -> str:
+    return request.base or read.child or "base_link"
+
+
+# --- markers ------------------------------------------------------------------------------------------------
+
+
+def _markers(read: _Read, chosen: _Chosen, request: Request, path: Path) -> Markers:
+    topic, kind = chosen.detections
+    detections = [one for frame in read.frames for one in frame.detections]
+    if not detections:
+        raise BslamError(
+            f"{path}: the {read.counts[topic]} messages of {topic} hold no marker; allowed: some"
+        )
+    sizes = request.sizes or TagSizes({})
+    if kind in CORNERS:
+        sizes.require({one.identity for one in detections}, topic)
+    elif request.sizes is not None:
+        raise BslamError(f"{topic}: {kind} tells places, so sizes of tags have no use; allowed: no --tags")
+    frames = sorted({frame.frame_id for frame in read.frames if frame.detections})
+    poses = {frame: _camera_pose(read, request, frame, path) for frame in frames}
+    return Markers(poses, sizes, _camera(read, request, frames, kind in CORNERS), request.pixel_sd)
+
+
+def _camera_pose(read: _Read, request: Request, frame: str, path: Path) -> Transform:
+    if request.mount is not None:
+        return Transform.of_camera(*request.mount)
+    base = _base(read, request)
+    pose = pose_in(read.tree, base, frame)
+    if pose is None:
+        there = ", ".join(sorted(read.tree.keys() | {parent for parent, _ in read.tree.values()}))
+        raise BslamError(
+            f"{path}: {TF_STATIC} has no way from {base} to {frame}, the camera's frame (frames: "
+            f"{there or 'none'}); allowed: --base FRAME of these, or --mount X_M,Y_M,YAW_RAD of the camera"
+        )
+    return pose
+
+
+def _camera(read: _Read, request: Request, frames: Sequence[str], needed: bool) -> Camera | None:
+    """The camera of these frames; None: it is neither known nor needed."""
+    fit = [name for name, one in read.cameras.items() if one.header.frame_id in frames]
+    names = fit or list(read.cameras)
+    if not needed:
+        known = [camera_of(read.cameras[name], False) for name in fit]
+        return known[0] if len(known) == 1 and known[0].fx > 0.0 else None
+    if len(frames) > 1:
+        raise BslamError(f"corners of several cameras ({', '.join(frames)}); allowed: a topic of one camera")
+    if len(names) != 1:
+        raise BslamError(f"--camera-info: allowed: one of {', '.join(names) or 'none with messages'}")
+    camera = camera_of(read.cameras[names[0]], bool(request.rectified))
+    if request.rectified is None and camera.is_distorted:
+        raise BslamError(
+            f"{names[0]}: the camera distorts; allowed: --image rectified, if the detector read image_rect "
+            "(apriltag_ros does), or --image raw"
+        )
+    if camera.model not in DISTORTIONS and camera.is_distorted:
+        raise BslamError(
+            f"{names[0]}: distortion model {camera.model!r}; allowed: {', '.join(DISTORTIONS[1:])}, or a "
+            "detector on the rectified image and --image rectified"
+        )
+    if not (camera.fx > 0.0 and camera.fy > 0.0):
+        raise BslamError(
+            f"{names[0]}: focal lengths {camera.fx:g}, {camera.fy:g}; allowed: a calibrated camera"
+        )
+    return camera
+
+
+def _within(sightings: Sightings, travel: Travel, chosen: _Chosen, notes: list[str]) -> Sightings:
+    """Those while odometry runs; a frame may be as late as rows are apart."""
+    start_us, end_us = int(travel.time_us[0]), int(travel.time_us[-1])
+    late_us = int(np.median(np.diff(travel.time_us)))
+    kept = (sightings.time_us >= start_us) & (sightings.time_us <= end_us + late_us)
+    if not kept.any():
+        seen = sightings.time_us[[0, -1]] * 1e-6 if len(kept) else np.full(2, math.nan)
+        raise BslamError(
+            f"{chosen.detections[0]} is stamped {seen[0]:.3f} to {seen[1]:.3f} s, {chosen.motion} "
+            f"{start_us * 1e-6:.3f} to {end_us * 1e-6:.3f} s; allowed: stamps of one clock"
+        )
+    if not kept.all():
+        lost = int((~kept).sum())
+        notes.append(f"{chosen.detections[0]}: left out {lost} sightings before or after the odometry")
+    columns = {one.name: getattr(sightings, one.name) for one in fields(sightings)}
+    cut: Any = {name: None if column is None else column[kept] for name, column in columns.items()}
+    return replace(sightings, **cut)
+
+
+# --- truth, robot.toml, what is said ------------------------------------------------------------------------
+
+
+def _truth(read: _Read, chosen: _Chosen, travel: Travel, notes: list[str]) -> Truth | None:
+    if chosen.truth is None:
+        return None
+    topic = chosen.truth[0]
+    if not read.truth:
+        raise BslamError(f"{topic} (--truth) holds no pose of {chosen.truth_frame or 'anything'}")
+    order = in_order([one.time_ns for one in read.truth], topic, notes)
+    time_us = np.array([read.truth[i].time_ns // 1000 for i in order], dtype=np.int64)
+    kept = without_repeats(time_us, topic, notes)
+    kept &= (time_us >= travel.time_us[0]) & (time_us <= travel.time_us[-1])
+    if not kept.any():
+        raise BslamError(f"{topic} (--truth): no pose while odometry runs; allowed: stamps of one clock")
+    x_m, y_m, theta_rad = (
+        np.array([getattr(read.truth[i], name) for i in order])[kept] for name in ("x_m", "y_m", "theta_rad")
+    )
+    return Truth(time_us[kept], x_m, y_m, theta_rad)
+
+
+def _robot(
+    request: Request, travel: Travel, sightings: Sightings, markers: Markers, gyro: Mapping[str, float]
+) -> tuple[Robot, list[str]]:
+    """robot.toml, and a line for each of its values that is a guess."""
+    mount, is_told = markers.mount, sightings.bearing_sd_rad is not None
+    view_rad, view_said = _field_of_view(sightings, markers)
+    known = {
+        "step_us": max(1, int(np.median(np.diff(travel.time_us)))),
+        "field_of_view_rad": view_rad,
+        "sensor_x_m": mount.x_m,
+        "sensor_y_m": mount.y_m,
+        "sensor_yaw_rad": mount.yaw_rad,
+        **gyro,
+    }
+    robot = parse_table(Robot, {**GUESSES, **known, **request.robot}, "robot.toml")
+    guessed = {name: value for name, value in GUESSES.items() if name not in request.robot}
+    lines = [
+        f"guessed: {name} = {value!r}; --set {name}=VALUE"
+        for name, value in guessed.items()
+        if not (is_told and name in _NOISE_OF_SIGHTINGS) and name != "range_sigma_scale_m"
+    ]
+    if is_told and markers.camera is not None:
+        lines.append(
+            f"guessed: corners err by {markers.pixel_sd:g} px (--pixel-sd); beside it a bearing by "
+            f"{BEARING_LEFT_RAD:g} rad and a range by {100 * RANGE_LEFT:g} %"
+        )
+    return robot, [*lines, *([view_said] if "field_of_view_rad" not in request.robot else [])]
+
+
+def _field_of_view(sightings: Sightings, markers: Markers) -> tuple[float, str]:
+    seen_rad = 2.0 * float(np.abs(sightings.bearing_rad).max())
+    camera = markers.camera
+    if camera is not None and camera.size_px[0] > 0:
+        half_px = max(camera.cx, camera.size_px[0] - camera.cx)
+        view_rad = min(max(2.0 * math.atan2(half_px, camera.fx), seen_rad), 6.2832)
+        return view_rad, f"field of view: {view_rad:.2f} rad, from camera_info"
+    view_rad = min(max(_ROOM_AT_THE_EDGES * seen_rad, 1e-3), 6.2832)
+    return view_rad, f"guessed: field_of_view_rad = {view_rad:.2f}, by the widest bearing"
+
+
+def _told(read: _Read, chosen: _Chosen, kinds: Mapping[str, str], log: Log, markers: Markers) -> list[str]:
+    """What was read, a line a topic."""
+    span_s = (log.odometry.time_us[-1] - log.odometry.time_us[0]) * 1e-6
+    lines = [
+        f"{topic} ({kinds[topic]}): {count} messages" + (f", {count / span_s:.1f} Hz" if span_s > 0 else "")
+        for topic, count in read.counts.items()
+        if topic != TF_STATIC and topic not in chosen.cameras
+    ]
+    way_m = float(np.abs(0.5 * (log.odometry.a + log.odometry.b)).sum())
+    lines.append(f"odometry: {len(log.odometry.time_us)} steps in {span_s:.1f} s, {way_m:.1f} m")
+    numbers = np.unique(log.sightings.beacon_id[log.sightings.beacon_id >= 0]).tolist()
+    named = ", ".join(log.identity(one) for one in numbers[:12]) + (", ..." if len(numbers) > 12 else "")
+    lines.append(
+        f"sightings: {len(log.sightings.time_us)} of {len(numbers)} beacons: {named or 'no identity'}"
+    )
+    mount = markers.mount
+    at = f"x {mount.x_m:.3f} m, y {mount.y_m:.3f} m, yaw {mount.yaw_rad:.4f} rad"
+    lines.append(f"sensor: {', '.join(markers.poses)} at {at}")
+    if log.truth is not None:
+        lines.append(f"truth: {len(log.truth.time_us)} poses")
+    return lines

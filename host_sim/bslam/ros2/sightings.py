@@ -1,0 +1,144 @@
+"""Markers of a bag as sightings: corners to places, places to bearings and ranges, names to numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+from bslam.log import Sightings
+from bslam.parsing.identities import BEACON_ID_MAX, WORD_MAX
+from bslam.ros2.geometry import Camera, Mount, Transform, on_ground, place_tags
+from bslam.ros2.messages import Detection, Frame
+from bslam.ros2.stamps import in_order
+from bslam.ros2.tags import TagSizes
+
+Floats = NDArray[np.float64]
+
+BEARING_LEFT_RAD, RANGE_LEFT: Final = 0.005, 0.01
+"""What calibration leaves: noise beside that of the corners; of a distance, a part of it."""
+_BEARING_SD_RAD, _RANGE_SD_M = (1e-5, math.pi), (1e-3, 1e4)  # as a log may have them
+_FARTHEST_M = 1e6
+
+
+@dataclass(frozen=True)
+class Markers:
+    """How detections become sightings.
+
+    sizes, camera: needed for corners alone. poses: of each camera frame on the robot.
+    """
+
+    poses: Mapping[str, Transform]
+    sizes: TagSizes
+    camera: Camera | None
+    pixel_sd: float
+
+    @property
+    def mount(self) -> Mount:
+        """The sensor of the log: the camera; the robot's middle, where there are several."""
+        only = list(self.poses.values())
+        return Mount.of(only[0]) if len(only) == 1 else Mount(0.0, 0.0, 0.0)
+
+    def placed(self, detections: Sequence[Detection]) -> list[Detection | None]:
+        """Each with its place, which corners are turned into; None: it has none in front of the camera."""
+        seen = [i for i, one in enumerate(detections) if one.corners_px is not None]
+        found = list(detections)
+        for i, place in zip(seen, self._of_corners([detections[i] for i in seen]), strict=True):
+            found[i] = place
+        return [one if _is_place(one) else None for one in found]
+
+    def _of_corners(self, detections: Sequence[Detection]) -> list[Detection]:
+        if not detections:
+            return []
+        assert self.camera is not None
+        corners = np.array([one.corners_px for one in detections])
+        rays = self.camera.rays(corners.reshape(-1, 2)).reshape(-1, 4, 2)
+        side_m = np.array([self.sizes.of(one.identity) or math.nan for one in detections])
+        places, covariances = place_tags(rays, side_m, self.pixel_sd / min(self.camera.fx, self.camera.fy))
+        columns = zip(detections, places, covariances, strict=True)
+        return [Detection(one.identity, place, covariance) for one, place, covariance in columns]
+
+    def sight(self, frame_id: str, placed: Detection, mount: Mount) -> tuple[float, float, float, float]:
+        """Bearing, range, and the sd of each (0: as the robot has it)."""
+        assert placed.position_m is not None
+        told = placed.covariance_m2
+        bearing_rad, range_m, bearing_sd, range_sd = on_ground(
+            placed.position_m, told, self.poses[frame_id], mount
+        )
+        if told is None:
+            return bearing_rad, range_m, 0.0, 0.0
+        bearing_sd, range_sd = math.hypot(bearing_sd, BEARING_LEFT_RAD), math.hypot(range_sd, RANGE_LEFT * range_m)
+        return bearing_rad, range_m, _within(bearing_sd, _BEARING_SD_RAD), _within(range_sd, _RANGE_SD_M)
+
+
+def _is_place(one: Detection) -> bool:
+    return one.position_m is not None and 0.0 < float(np.linalg.norm(one.position_m)) < _FARTHEST_M
+
+
+def _within(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])
+
+
+def sightings_of(
+    frames: Sequence[Frame], markers: Markers, topic: str, notes: list[str]
+) -> tuple[Sightings, tuple[str, ...]]:
+    """The sightings in order of time, and the words that stand for identities, if they are no numbers.
+
+    Raises BslamError where the stamps make no sense.
+    """
+    order, mount = in_order([one.time_ns for one in frames], topic, notes), markers.mount
+    rows = [(frames[i], one) for i in order for one in frames[i].detections]
+    texts, numbers, lost, twice = list[str](), list[tuple[float, ...]](), 0, 0
+    seen: set[tuple[int, str, str]] = set()
+    for (frame, one), placed in zip(rows, markers.placed([one for _, one in rows]), strict=True):
+        key = (frame.time_ns // 1000, frame.frame_id, one.identity)
+        if one.identity and key in seen:
+            twice += 1
+        elif placed is None:
+            lost += 1
+        else:
+            seen.add(key)
+            texts.append(one.identity)
+            numbers.append((float(key[0]), *markers.sight(frame.frame_id, placed, mount)))
+    if twice:
+        notes.append(f"{topic}: left out {twice} markers that their frame has already")
+    if lost:
+        notes.append(f"{topic}: left out {lost} markers without a place in front of the camera")
+    return _table(texts, numbers)
+
+
+def _table(texts: list[str], numbers: list[tuple[float, ...]]) -> tuple[Sightings, tuple[str, ...]]:
+    time, bearing_rad, range_m, bearing_sd, range_sd = np.array(numbers, dtype=np.float64).reshape(-1, 5).T
+    identity, words = _numbered(texts)
+    told = bool(bearing_sd.any())
+    table = Sightings(
+        time_us=time.astype(np.int64),
+        beacon_id=identity,
+        bearing_rad=bearing_rad,
+        range_m=range_m,
+        mappable=np.ones(len(texts), dtype=np.bool_),
+        bearing_sd_rad=bearing_sd if told else None,
+        range_sd_m=range_sd if told else None,
+    )
+    return table, words
+
+
+def _numbered(texts: Sequence[str]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Numbers for identities; the words that they stand for, unless all are numbers of one family."""
+    names = sorted({one for one in texts if one})
+    families = {one.rpartition(":")[0] for one in names}
+    tails = {one: one.rpartition(":")[2] for one in names}
+    plain = all(tail.isdecimal() and int(tail) <= BEACON_ID_MAX for tail in tails.values())
+    if plain and len(families) <= 1:
+        number, words = {one: int(tail) for one, tail in tails.items()}, ()
+    else:
+        long = [one for one in names if len(one) > WORD_MAX or not one.isprintable()]
+        if long:
+            raise BslamError(f"marker {long[0]!r}: allowed: up to {WORD_MAX} printable characters")
+        number, words = {one: i for i, one in enumerate(names)}, tuple(names)  # type: ignore[assignment]
+    return np.array([number.get(one, -1) for one in texts], dtype=np.int64), words

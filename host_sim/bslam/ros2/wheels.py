@@ -1,0 +1,195 @@
+"""Odometry of a bag as travel of two wheels: from poses, from wheel joints, with a gyro beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+from bslam.log import Odometry, wrap_rad
+from bslam.ros2.geometry import Transform
+from bslam.ros2.messages import PlanarPose, time_ns, turn_rate_of, twist_of
+from bslam.ros2.stamps import in_order, without_repeats
+
+Floats = NDArray[np.float64]
+
+JUMP_MPS, JUMP_M = 10.0, 1.0
+"""An odometry that moves faster, and so far at once, was set anew."""
+SIDEWAYS_SHARE = 0.05
+GYRO_SD_RADPS = 0.02
+"""Of a gyro that does not say."""
+
+
+@dataclass
+class Poses:
+    """What an odometry topic told, message by message."""
+
+    poses: list[PlanarPose] = field(default_factory=list)
+    twists: list[tuple[float, float]] = field(default_factory=list)
+
+    def add(self, pose: PlanarPose, message: Any) -> None:
+        self.poses.append(pose)
+        self.twists.append(twist_of(message))
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Way and turn from message to message; row 0 starts the clock and moves nothing."""
+
+    time_us: NDArray[np.int64]  # (n,)
+    way_m: Floats  # (n - 1,)
+    turn_rad: Floats  # (n - 1,)
+
+    def wheels(self, wheelbase_m: float, gyro_radps: Floats | None = None) -> Odometry:
+        half_m = 0.5 * wheelbase_m * self.turn_rad
+        return Odometry("wheels", self.time_us[1:], self.way_m - half_m, self.way_m + half_m, gyro_radps)
+
+
+def travel_of_poses(told: Poses, topic: str, notes: list[str]) -> Travel:
+    """Arcs between the poses of an odometry topic; speeds where the pose says nothing.
+
+    Raises BslamError for fewer than two messages, or numbers that are none.
+    """
+    order = in_order([one.time_ns for one in told.poses], topic, notes)
+    time_us = np.array([told.poses[i].time_ns // 1000 for i in order], dtype=np.int64)
+    order, time_us = _unrepeated(order, time_us, topic, notes)
+    pose = np.array([(told.poses[i].x_m, told.poses[i].y_m, told.poses[i].theta_rad) for i in order])
+    twist = np.array([told.twists[i] for i in order])
+    _require_finite(np.hstack([pose, twist]), topic)
+    way_m, aside_m, turn_rad = _arcs(pose)
+    dt_s = np.diff(time_us) * 1e-6
+    by_twist = _is_jump(way_m, aside_m, dt_s)
+    if by_twist.any():
+        notes.append(f"{topic}: the pose jumps {int(by_twist.sum())} times; there its speeds are taken")
+    if not np.ptp(pose, axis=0).any() and twist.any():
+        notes.append(f"{topic}: the pose never changes; its speeds are taken")
+        by_twist[:] = True
+    way_m = np.where(by_twist, twist[1:, 0] * dt_s, way_m)
+    turn_rad = np.where(by_twist, twist[1:, 1] * dt_s, turn_rad)
+    ahead_m, sideways_m = np.abs(way_m).sum(), np.abs(aside_m[~by_twist]).sum()
+    if sideways_m > SIDEWAYS_SHARE * (ahead_m + sideways_m):
+        notes.append(
+            f"{topic}: {sideways_m:.2f} m of its way go sideways and are lost: wheels only roll ahead"
+        )
+    return Travel(time_us, way_m, turn_rad)
+
+
+def _arcs(pose: Floats) -> tuple[Floats, Floats, Floats]:
+    """Way along the arc, way aside of it, and turn from pose to pose."""
+    step_m, turn_rad = np.diff(pose[:, :2], axis=0), wrap_rad(np.diff(pose[:, 2]))
+    heading_rad = pose[:-1, 2] + 0.5 * turn_rad
+    ahead = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    chord_over_arc = np.sinc(turn_rad / (2.0 * np.pi))  # sin(half turn) / half turn
+    return (step_m * ahead).sum(axis=1) / chord_over_arc, (step_m * aside).sum(axis=1), turn_rad
+
+
+def _is_jump(way_m: Floats, aside_m: Floats, dt_s: Floats) -> NDArray[np.bool_]:
+    moved_m = np.hypot(way_m, aside_m)
+    return (moved_m > JUMP_M) & (moved_m > JUMP_MPS * dt_s)
+
+
+@dataclass
+class Joints:
+    """Angles of the wheels' joints, from the messages that have both."""
+
+    left: str | None
+    right: str | None
+    stamps_ns: list[int] = field(default_factory=list)
+    angles_rad: list[tuple[float, float]] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+
+    def add(self, message: Any) -> None:
+        names = list(message.name)
+        if not self.names.issuperset(names):
+            self.names.update(names)
+            self._choose()
+        if self.left in names and self.right in names and len(message.position) == len(names):
+            both = (self.left, self.right)
+            left_rad, right_rad = (float(message.position[names.index(str(one))]) for one in both)
+            self.stamps_ns.append(time_ns(message.header))
+            self.angles_rad.append((left_rad, right_rad))
+
+    def _choose(self) -> None:
+        """The joint with "left" and the one with "right" and "wheel" in its name, where nobody named them."""
+        for side in ("left", "right"):
+            fit = [one for one in self.names if side in one.lower() and "wheel" in one.lower()]
+            if getattr(self, side) is None and len(fit) == 1:
+                setattr(self, side, fit[0])
+
+
+def travel_of_joints(
+    told: Joints, topic: str, radius_m: float, wheelbase_m: float, notes: list[str]
+) -> Travel:
+    """From angles of joints. Raises BslamError if there are no such joints, or fewer than two messages."""
+    if not told.stamps_ns:
+        named = (
+            f"no messages with positions of the joints {told.left or 'left?'} and {told.right or 'right?'}"
+        )
+        there = f"--left-joint and --right-joint of {', '.join(sorted(told.names)) or 'none'}"
+        raise BslamError(f"{topic}: {named}; allowed: {there}")
+    order = in_order(told.stamps_ns, topic, notes)
+    time_us = np.array(told.stamps_ns, dtype=np.int64)[order] // 1000
+    order, time_us = _unrepeated(order, time_us, topic, notes)
+    angles_rad = np.array(told.angles_rad)[order]
+    _require_finite(angles_rad, topic)
+    left_m, right_m = radius_m * np.diff(angles_rad, axis=0).T
+    return Travel(time_us, 0.5 * (left_m + right_m), (right_m - left_m) / wheelbase_m)
+
+
+def _unrepeated(
+    order: NDArray[np.int64], time_us: NDArray[np.int64], topic: str, notes: list[str]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    new = without_repeats(time_us, topic, notes)
+    if new.sum() < 2:
+        raise BslamError(
+            f"{topic}: {int(new.sum())} messages; allowed: two or more, with stamps of their own"
+        )
+    return order[new], time_us[new]
+
+
+def _require_finite(values: Floats, topic: str) -> None:
+    bad = ~np.isfinite(values).all(axis=1)
+    if bad.any():
+        raise BslamError(f"{topic}: message {int(np.argmax(bad))} has numbers that are not finite")
+
+
+@dataclass
+class Gyro:
+    """Angular velocities of an IMU."""
+
+    stamps_ns: list[int] = field(default_factory=list)
+    rates_radps: list[Floats] = field(default_factory=list)
+    frame_id: str = ""
+    sd_radps: float = 0.0
+
+    def add(self, message: Any) -> None:
+        self.frame_id, rate, sd = turn_rate_of(message)
+        self.stamps_ns.append(time_ns(message.header))
+        self.rates_radps.append(rate)
+        self.sd_radps = max(self.sd_radps, sd)
+
+
+def gyro_means(
+    told: Gyro, topic: str, pose: Transform, time_us: NDArray[np.int64], notes: list[str]
+) -> tuple[Floats, float]:
+    """Mean turn rate about the robot's z from time to time (n - 1,), NaN: none there; and its noise, rad/s.
+
+    pose: of the IMU on the robot.
+    """
+    order = in_order(told.stamps_ns, topic, notes)
+    stamps_us = np.array(told.stamps_ns, dtype=np.int64)[order] // 1000
+    rate = np.array(told.rates_radps)[order] @ pose.rotation[2]
+    _require_finite(rate[:, np.newaxis], topic)
+    total = np.concatenate([[0.0], np.cumsum(rate)])
+    upto = np.searchsorted(stamps_us, time_us, side="right")
+    count = np.diff(upto)
+    with np.errstate(invalid="ignore"):
+        means = np.diff(total[upto]) / np.where(count > 0, count, np.nan)
+    if not count.any():
+        raise BslamError(f"{topic}: no message within the time of the odometry; allowed: stamps of one clock")
+    sd = told.sd_radps / float(np.sqrt(max(1.0, float(np.median(count)))))
+    return means, min(max(sd, 1e-6), 100.0) if told.sd_radps > 0.0 else GYRO_SD_RADPS
