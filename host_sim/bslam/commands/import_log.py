@@ -31,7 +31,7 @@ one of its kind. Where the camera sits comes from /tf_static. Stamps are those o
 Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
 
 _LOG_FILES = ("odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml")
-_OTHERS = tuple(f"{name}.gz" for name in _LOG_FILES[:4]) + ("signatures.npy", "seeds.npy")
+_OTHERS = (*(f"{name}.gz" for name in _LOG_FILES[:4]), "signatures.npy", "seeds.npy")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +129,7 @@ def _robot_keys(arguments: argparse.Namespace) -> dict[str, Any]:
             raise BslamError(f"--set {text!r}: allowed: KEY=VALUE, as wheel_speed_sigma_mps=0.02")
     if arguments.wheelbase is not None:
         keys["wheelbase_m"] = WHEELBASE_M.convert(arguments.wheelbase, "--wheelbase")
-    placeholder = {one: 1 for one in ("wheelbase_m", "step_us", "range_sigma_scale_m")}
+    placeholder = dict.fromkeys(("wheelbase_m", "step_us", "range_sigma_scale_m"), 1)
     noise = ("wheel_speed_sigma_mps", "field_of_view_rad", "bearing_sigma_rad", "range_sigma_fraction")
     parse_table(Robot, {**placeholder, **dict.fromkeys(noise, 1.0), **keys}, "--set")
     return keys

@@ -62,7 +62,7 @@ class Bag:
         self._reader.close()
 
     def topic_of(self, option: str, topic: str | None, kinds: Sequence[str]) -> tuple[str, str] | None:
-        """The topic that an option names, else the only one of these kinds, and its kind; None: there is none.
+        """The topic that an option names, else the only one of these kinds, and its kind; None: none.
 
         Raises BslamError if there is no such topic, it is of another kind, or there are several.
         """
@@ -114,8 +114,8 @@ class Bag:
                 types |= _defined_in(one)
             if one.msgtype not in types:
                 raise BslamError(
-                    f"{self.path}: topic {one.topic} is of type {one.msgtype}, which the bag does not define; "
-                    f"allowed: a bag in mcap, or the types {', '.join(DEFINITIONS)}"
+                    f"{self.path}: topic {one.topic} is of type {one.msgtype}, which the bag does not define;"
+                    f" allowed: a bag in mcap, or the types {', '.join(DEFINITIONS)}"
                 )
         store = get_typestore(Stores.EMPTY)
         store.register(types)

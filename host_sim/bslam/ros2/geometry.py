@@ -21,7 +21,7 @@ _UNDISTORT_STEPS, _UNDISTORT_WITHIN = 50, 1e-4
 _FIT_STEPS: Final = 40
 _FIT_WITHIN: Final = 1e-6  # of its sd: a step so small is the last
 _TILT_SD_RAD: Final = 1.0  # what is known of a tag's tilt before it is seen: holds those seen from the front
-# From the top left in the image, seen from the front, clockwise; any other order round it gives its centre too.
+# From the top left, clockwise in the image; any other order round the tag gives its centre too.
 _SQUARE: Final = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
@@ -149,7 +149,7 @@ class Camera:
         return any(self.distortion)
 
     def rays(self, pixels: Floats) -> Floats:
-        """x/z and y/z of the rays through pixels (n, 2), distortion taken out; NaN where it has no inverse."""
+        """x/z and y/z of the rays through pixels (n, 2), distortion taken out; NaN: it has no inverse."""
         seen = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
         if not self.is_distorted:
             return seen
@@ -213,8 +213,8 @@ def place_tags(rays: Floats, side_m: Floats, ray_sd: float) -> tuple[Floats, Flo
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
     """Of (n, k, k) and (n, k); NaN where there is no solution."""
-    good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-    good[good] &= np.linalg.det(matrix[good]) != 0.0
+    good: NDArray[np.bool_] = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    good[good] &= np.abs(np.linalg.det(matrix[good])) > 0.0
     solution = np.full(right.shape, np.nan)
     solution[good] = np.linalg.solve(matrix[good], right[good][:, :, np.newaxis])[:, :, 0]
     return solution
@@ -239,8 +239,7 @@ def _from_homography(rays: Floats, side_m: Floats) -> tuple[Floats, Floats]:
 
 
 def _missed(rays: Floats, corners: Floats, rotation: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """By how much the corners' rays are missed (n, 8), and the slope (n, 8, 6) of the rays by a turn about the
-    camera's axes and a shift."""
+    """By how much the corners' rays are missed (n, 8), and how they change (n, 8, 6): see `_slope`."""
     turned = np.einsum("nij,nkj->nki", rotation, corners)
     points = turned + place[:, np.newaxis]
     missed = (rays - points[:, :, :2] / points[:, :, 2:]).reshape(len(rays), 8)

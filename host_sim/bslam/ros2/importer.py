@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.log import Log, Odometry, Robot, Sightings, Truth
+from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
 from bslam.ros2.bag import Bag
-from bslam.ros2.geometry import DISTORTIONS, Camera, Mount, Transform, pose_in
+from bslam.ros2.geometry import DISTORTIONS, Camera, Transform, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
     CORNERS,
@@ -162,8 +162,8 @@ def _choose(bag: Bag, request: Request) -> _Chosen:
         )
     if detections is None:
         raise BslamError(
-            f"{bag.path}: no topic of markers; allowed: --detections TOPIC of {bag.listing(list(DETECTIONS))}; "
-            f"types: {', '.join(DETECTIONS)}"
+            f"{bag.path}: no topic of markers; allowed: --detections TOPIC of "
+            f"{bag.listing(list(DETECTIONS))}; types: {', '.join(DETECTIONS)}"
         )
     truth, _, truth_frame = (request.truth or "").partition(":")
     chosen = _Chosen(
@@ -194,8 +194,8 @@ def _camera_topics(bag: Bag, request: Request, detections: tuple[str, str]) -> t
     there = tuple(name for name, kind in bag.topics.items() if kind == CAMERA_INFO and bag.counts[name])
     if not there and detections[1] in CORNERS:
         raise BslamError(
-            f"{bag.path}: {detections[0]} has corners in pixels, and no {CAMERA_INFO} is there; allowed: a bag "
-            "with camera_info, or a topic with poses of the markers"
+            f"{bag.path}: {detections[0]} has corners in pixels, and no {CAMERA_INFO} is there; allowed: a "
+            "bag with camera_info, or a topic with poses of the markers"
         )
     return there
 

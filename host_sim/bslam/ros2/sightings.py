@@ -20,7 +20,8 @@ from bslam.ros2.tags import TagSizes
 
 Floats = NDArray[np.float64]
 
-BEARING_LEFT_RAD, RANGE_LEFT: Final = 0.005, 0.01
+BEARING_LEFT_RAD: Final = 0.005
+RANGE_LEFT: Final = 0.01
 """What calibration leaves: noise beside that of the corners; of a distance, a part of it."""
 _BEARING_SD_RAD, _RANGE_SD_M = (1e-5, math.pi), (1e-3, 1e4)  # as a log may have them
 _FARTHEST_M = 1e6
@@ -72,7 +73,8 @@ class Markers:
         )
         if told is None:
             return bearing_rad, range_m, 0.0, 0.0
-        bearing_sd, range_sd = math.hypot(bearing_sd, BEARING_LEFT_RAD), math.hypot(range_sd, RANGE_LEFT * range_m)
+        bearing_sd = math.hypot(bearing_sd, BEARING_LEFT_RAD)
+        range_sd = math.hypot(range_sd, RANGE_LEFT * range_m)
         return bearing_rad, range_m, _within(bearing_sd, _BEARING_SD_RAD), _within(range_sd, _RANGE_SD_M)
 
 

@@ -31,8 +31,8 @@ def in_order(stamps_ns: list[int], topic: str, notes: list[str]) -> NDArray[np.i
     if behind.size and behind.max() > BACK_MAX_NS:
         row = int(np.argmax(behind > BACK_MAX_NS))
         raise BslamError(
-            f"{topic}: header.stamp of message {first + row} runs back by {behind[row] * 1e-9:.3f} s; allowed: "
-            f"{BACK_MAX_NS * 1e-9:g} s, as a simulation that starts anew makes two drives of one bag"
+            f"{topic}: header.stamp of message {first + row} runs back by {behind[row] * 1e-9:.3f} s; "
+            f"allowed: {BACK_MAX_NS * 1e-9:g} s, as a simulation that starts anew makes two drives of one bag"
         )
     if (behind > 0).any():
         notes.append(f"{topic}: {int((behind > 0).sum())} messages came out of order and were sorted")
