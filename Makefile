@@ -18,6 +18,7 @@ include mk/rtos.mk
 include mk/lint.mk
 include mk/bench.mk
 include mk/docs.mk
+include mk/playground.mk
 include mk/fuzz.mk
 include mk/mcdc.mk
 include mk/soak.mk

@@ -90,7 +90,8 @@ find_missing() {
     need chromium-headless-shell "trying the pages in a browser" has_browser
     need valgrind "counting instructions" command -v valgrind
     need g++ "users' programs in C++" command -v g++
-    need clang-19 "users' programs, by a second compiler" command -v clang++-19
+    need clang-19 "users' programs by a second compiler, and the playground" command -v clang++-19
+    need lld-19 "linking the playground" command -v wasm-ld-19
     [[ $part == test || $part == bench ]] && return
     need llvm-19 "reading coverage" command -v llvm-cov-19
     need libclang-rt-19-dev "fuzzing and coverage" sh -c 'echo "int main(void) { return 0; }" |

@@ -1,0 +1,222 @@
+"use strict";
+// What the user does, and what the page shows.
+
+const KEYS = {
+    ArrowUp: [1, 0], KeyW: [1, 0],
+    ArrowDown: [-1, 0], KeyS: [-1, 0],
+    ArrowLeft: [0, 1], KeyA: [0, 1],
+    ArrowRight: [0, -1], KeyD: [0, -1],
+};
+const STEPS_A_PICTURE = 60; // a slow machine drives slower than asked, and stays usable
+const PLOT_S = 60;
+const FIRST_STEPS = 25; // so that there is a map at once
+const NUMBERS = ["wheelNoise", "beacons", "seed", "fieldOfView"];
+const WORDS = ["filter", "association", "observation"];
+
+const element = (id) => document.getElementById(id);
+const page = { drive: null, log: null, isPlaying: true, held: new Set(), lastMs: 0, owedSteps: 0 };
+
+function readChoices() {
+    const numbers = NUMBERS.map((id) => [id, clamped(element(id))]);
+    return Object.fromEntries([...WORDS.map((id) => [id, element(id).value]), ...numbers]);
+}
+
+/** The number in a field, or the nearest that it allows. */
+function clamped(field) {
+    const value = Number(field.value) || 0;
+    const limits = [field.min, field.max].map((limit) => (limit === "" || limit === undefined ? NaN : Number(limit)));
+    return Math.min(Math.max(value, isNaN(limits[0]) ? value : limits[0]), isNaN(limits[1]) ? value : limits[1]);
+}
+
+function say(text) {
+    element("message").textContent = text;
+    element("message").hidden = text === "";
+}
+
+function restart() {
+    page.drive = new Drive(readChoices());
+    page.owedSteps = 0;
+    for (let step = 0; step < FIRST_STEPS; step++) {
+        page.drive.step(null);
+    }
+    show();
+}
+
+/** What the keys and pads say; null: the robot drives itself. */
+function command() {
+    if (element("self").checked) {
+        return null;
+    }
+    const pairs = [...page.held].map((key) => KEYS[key]);
+    const sum = (place) => Math.max(-1, Math.min(1, pairs.reduce((total, pair) => total + pair[place], 0)));
+    return { forward: sum(0), turn: sum(1) };
+}
+
+function tick(nowMs) {
+    const elapsedMs = Math.min(nowMs - page.lastMs, 100);
+    page.lastMs = nowMs;
+    if (page.isPlaying && !page.log) {
+        page.owedSteps += (1e3 * elapsedMs * Number(element("speed").value)) / STEP_US;
+        const steps = Math.min(Math.floor(page.owedSteps), STEPS_A_PICTURE);
+        page.owedSteps = steps === STEPS_A_PICTURE ? 0 : page.owedSteps - steps;
+        if (steps > 0) {
+            takeSteps(steps);
+        }
+    }
+    requestAnimationFrame(tick);
+}
+
+function takeSteps(count) {
+    for (let step = 0; step < count; step++) {
+        page.drive.step(command());
+    }
+    show();
+}
+
+// ---- showing ----------------------------------------------------------------------------------------------
+
+function show() {
+    if (page.log) {
+        showLog(page.log);
+    } else {
+        showDrive(page.drive);
+    }
+}
+
+function showDrive(drive) {
+    new MapView(element("map"), {
+        bounds: ROOM,
+        walls: ROOM,
+        truePath: drive.truePath.points,
+        odometryPath: drive.odometryPath.points,
+        path: drive.path.points,
+        trueBeacons: drive.world.beacons.map((beacon) => ({ ...beacon, name: String(beacon.id) })),
+        beacons: drive.beacons.map((beacon) => ({ ...beacon, name: nameOf(beacon) })),
+        sightings: drive.sightings,
+        pose: drive.pose,
+        truePose: drive.world.pose,
+    });
+    const last = drive.errors.length ? drive.errors[drive.errors.length - 1][0] : 0;
+    drawPlots(element("plots"), drive.errors.filter((row) => row[0] > last - PLOT_S));
+    showFigures(driveFigures(drive));
+    element("wheelNoiseText").textContent = `${drive.choices.wheelNoise.toFixed(2)} m/s`;
+    element("beaconsText").textContent = String(drive.choices.beacons);
+}
+
+/** A beacon that was told has its true beacon's number there already. */
+function nameOf(beacon) {
+    return beacon.label >= 0 ? "" : `#${beacon.uid}`;
+}
+
+function driveFigures(drive) {
+    const { right, wrong, new: started, rejected } = drive.ledger.counts;
+    const health = drive.estimator.health();
+    return [
+        ["time", `${(1e-6 * drive.world.timeUs).toFixed(1)} s`],
+        ["robot is", drive.world.isSlipping ? `${health.state}, wheel slips` : health.state],
+        ["error now, mean", `${centimetres(lastOf(drive.errors, 1))}, ${centimetres(meanOf(drive.errors, 1))}`],
+        ["mean NEES (3 is right)", meanOf(drive.errors, 2).toFixed(1)],
+        ["beacons in the map, in the room", `${health.beacons}, ${drive.world.beacons.length}`],
+        ["matches right, wrong", `${right}, ${wrong}`],
+        ["sightings new, not used", `${started}, ${rejected}`],
+        ["fingerprint", drive.estimator.fingerprint()],
+    ];
+}
+
+function showFigures(rows) {
+    const table = element("figures");
+    table.replaceChildren(...rows.map(([name, value]) => {
+        const row = document.createElement("tr");
+        const head = document.createElement("th");
+        head.scope = "row";
+        head.textContent = name;
+        const cell = document.createElement("td");
+        cell.textContent = value;
+        row.append(head, cell);
+        return row;
+    }));
+}
+
+function lastOf(rows, column) {
+    return rows.length ? rows[rows.length - 1][column] : NaN;
+}
+
+function meanOf(rows, column) {
+    const known = rows.map((row) => row[column]).filter(Number.isFinite);
+    return known.reduce((sum, value) => sum + value, 0) / known.length;
+}
+
+function centimetres(metres) {
+    return `${(100 * metres).toFixed(1)} cm`;
+}
+
+// ---- doing ------------------------------------------------------------------------------------------------
+
+function setPlaying(isPlaying) {
+    page.isPlaying = isPlaying;
+    element("pause").textContent = isPlaying ? "Pause" : "Go on";
+}
+
+function hold(key) {
+    element("self").checked = false;
+    page.held.add(key);
+}
+
+function isTyping(target) {
+    return target instanceof HTMLElement && target.matches("input:not([type=checkbox]), select");
+}
+
+function onKeyDown(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
+        return;
+    }
+    if (event.code in KEYS) {
+        hold(event.code);
+        event.preventDefault();
+    } else if (event.code === "Space" && !(event.target instanceof HTMLElement && event.target.matches("button, input"))) {
+        setPlaying(!page.isPlaying);
+        event.preventDefault();
+    }
+}
+
+function bindPads() {
+    for (const pad of document.querySelectorAll("#pads button")) {
+        const key = pad.dataset.key;
+        pad.addEventListener("pointerdown", () => hold(key));
+        for (const end of ["pointerup", "pointerleave", "pointercancel"]) {
+            pad.addEventListener(end, () => page.held.delete(key));
+        }
+    }
+}
+
+function bind() {
+    window.addEventListener("keydown", onKeyDown);
+    window.addEventListener("keyup", (event) => page.held.delete(event.code));
+    window.addEventListener("blur", () => page.held.clear());
+    window.addEventListener("resize", show);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
+    bindPads();
+    element("pause").addEventListener("click", () => setPlaying(!page.isPlaying));
+    element("step").addEventListener("click", () => {
+        setPlaying(false);
+        takeSteps(1);
+    });
+    element("restart").addEventListener("click", restart);
+    element("slip").addEventListener("click", () => page.drive.world.slip());
+    element("carry").addEventListener("click", () => page.drive.world.carryAway());
+    for (const id of [...NUMBERS, ...WORDS]) {
+        element(id).addEventListener("input", onChoice);
+    }
+}
+
+function onChoice() {
+    restart();
+}
+
+function begin() {
+    bind();
+    restart();
+    requestAnimationFrame(tick);
+}
+
+begin();
