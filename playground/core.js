@@ -113,7 +113,8 @@ class Estimator {
                 return null;
             }
         }
-        return this.took(this.core.page_frame(timeUs)) ? sightings.map((_, index) => this.account(index)) : null;
+        const isTaken = this.took(this.core.page_frame(timeUs));
+        return isTaken ? sightings.map((_, index) => this.account(index)) : null;
     }
 
     account(index) {

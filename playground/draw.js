@@ -71,7 +71,8 @@ class MapView {
     drawWalls({ left, right, bottom, top }) {
         this.pen.strokeStyle = this.colours.quiet;
         this.pen.lineWidth = 3;
-        this.pen.strokeRect(this.x(left), this.y(top), this.scale * (right - left), this.scale * (top - bottom));
+        const size = [this.scale * (right - left), this.scale * (top - bottom)];
+        this.pen.strokeRect(this.x(left), this.y(top), ...size);
     }
 
     drawPath(points, colour, width, dashes = []) {

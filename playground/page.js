@@ -14,7 +14,15 @@ const NUMBERS = ["wheelNoise", "beacons", "seed", "fieldOfView"];
 const WORDS = ["filter", "association", "observation"];
 
 const element = (id) => document.getElementById(id);
-const page = { drive: null, log: null, isPlaying: true, held: new Set(), lastMs: 0, owedSteps: 0 };
+const page = {
+    drive: null,
+    shown: null, // a log in place of the room
+    roomChoices: null, // to go back to
+    isPlaying: true,
+    held: new Set(),
+    lastMs: 0,
+    owedSteps: 0,
+};
 
 function readChoices() {
     const numbers = NUMBERS.map((id) => [id, clamped(element(id))]);
@@ -24,8 +32,7 @@ function readChoices() {
 /** The number in a field, or the nearest that it allows. */
 function clamped(field) {
     const value = Number(field.value) || 0;
-    const limits = [field.min, field.max].map((limit) => (limit === "" || limit === undefined ? NaN : Number(limit)));
-    return Math.min(Math.max(value, isNaN(limits[0]) ? value : limits[0]), isNaN(limits[1]) ? value : limits[1]);
+    return field.max ? Math.min(Math.max(value, Number(field.min)), Number(field.max)) : value;
 }
 
 function say(text) {
@@ -55,7 +62,7 @@ function command() {
 function tick(nowMs) {
     const elapsedMs = Math.min(nowMs - page.lastMs, 100);
     page.lastMs = nowMs;
-    if (page.isPlaying && !page.log) {
+    if (page.isPlaying && !page.shown) {
         page.owedSteps += (1e3 * elapsedMs * Number(element("speed").value)) / STEP_US;
         const steps = Math.min(Math.floor(page.owedSteps), STEPS_A_PICTURE);
         page.owedSteps = steps === STEPS_A_PICTURE ? 0 : page.owedSteps - steps;
@@ -76,8 +83,8 @@ function takeSteps(count) {
 // ---- showing ----------------------------------------------------------------------------------------------
 
 function show() {
-    if (page.log) {
-        showLog(page.log);
+    if (page.shown) {
+        showLog(page.shown);
     } else {
         showDrive(page.drive);
     }
@@ -173,7 +180,7 @@ function onKeyDown(event) {
     if (event.code in KEYS) {
         hold(event.code);
         event.preventDefault();
-    } else if (event.code === "Space" && !(event.target instanceof HTMLElement && event.target.matches("button, input"))) {
+    } else if (event.code === "Space" && !event.target.matches?.("button, input")) {
         setPlaying(!page.isPlaying);
         event.preventDefault();
     }
@@ -202,6 +209,7 @@ function bind() {
         takeSteps(1);
     });
     element("restart").addEventListener("click", restart);
+    element("room").addEventListener("click", backToRoom);
     element("slip").addEventListener("click", () => page.drive.world.slip());
     element("carry").addEventListener("click", () => page.drive.world.carryAway());
     for (const id of [...NUMBERS, ...WORDS]) {
@@ -210,11 +218,16 @@ function bind() {
 }
 
 function onChoice() {
-    restart();
+    if (page.shown) {
+        runLog(page.shown.checked, readChoices());
+    } else {
+        restart();
+    }
 }
 
 function begin() {
     bind();
+    bindFiles();
     restart();
     requestAnimationFrame(tick);
 }

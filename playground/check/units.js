@@ -1,0 +1,132 @@
+"use strict";
+// Units and signs, told by a table of slips: host_sim/bslam/logcheck/units.py.
+
+const UNITS = { millimetres: 1e-3, centimetres: 1e-2, inches: 0.0254, feet: 0.3048 };
+const DEGREE = Math.PI / 180;
+const GROSS = Math.log(2.2); // a factor beyond it is of a unit
+const SAME = Math.log(1.45); // a factor so near to a slip's is that slip's
+const SURE_ERRORS = 5;
+const FASTEST_MPS = 30;
+
+/** The slip of units that explains most of the flow, as factors and a finding; null if it needs none. */
+function unitSlip(log, drive, flow) {
+    const costs = unitSlips(log).map((slip) => [sumOf(misfits(slip.factors, flow)), slip]);
+    const [, best] = costs.reduce((least, one) => (one[0] < least[0] ? one : least));
+    let sure = `sightings show ${general(flow.way, 4)} of odometry's way and ${general(flow.turn, 4)} of its turn`;
+    if (isMended(best.factors, flow)) {
+        return slipFinding(best, sure);
+    }
+    if (log.odometry.kind !== "velocity" || drive.speedMps <= FASTEST_MPS) {
+        return null;
+    }
+    sure += `; as told it drives ${drive.speedMps.toFixed(0)} m/s`;
+    const what = "v_mps and range_m are in millimetres";
+    const factors = { ...NO_FACTORS, way: 1e-3, range: 1e-3 };
+    return slipFinding({ kind: "units", what, columns: "v_mps and range_m", factors }, sure);
+}
+
+function slipFinding({ kind, what, columns, factors }, sure) {
+    const factor = Object.values(factors).find((one) => one !== 1);
+    return { factors, finding: { kind, what, sure, mend: `multiply ${columns} by ${general(factor)}` } };
+}
+
+function isMended(factors, flow) {
+    const before = misfits(NO_FACTORS, flow);
+    const after = misfits(factors, flow);
+    const changed = after.filter((one, place) => one !== before[place]);
+    return sumOf(before) - sumOf(after) > GROSS && Math.max(...changed) < SAME;
+}
+
+function sumOf(values) {
+    return values.reduce((sum, value) => sum + value, 0);
+}
+
+function unitSlips(log) {
+    const { kind } = log.odometry;
+    const columns = (kind === "ticks" ? ["left_radius_m", "right_radius_m"] : ODOMETRY_COLUMNS[kind]).join(" and ");
+    const both = `${columns} and range_m`;
+    const slip = (slipKind, what, names, factors) => (
+        { kind: slipKind, what, columns: names, factors: { ...NO_FACTORS, ...factors } });
+    const slips = Object.entries(UNITS).flatMap(([name, unit]) => [
+        slip("units", `sightings.csv: range_m is in ${name}`, "range_m", { range: unit }),
+        ...(kind === "velocity"
+            ? [slip("units", `odometry.csv: v_mps is in ${name}`, "v_mps", { way: unit })]
+            : [
+                slip("units", `odometry: ${columns} are in ${name}`, columns, { way: unit, turn: unit }),
+                slip("units", `odometry and sightings: ${both} are in ${name}`, both,
+                    { way: unit, turn: unit, range: unit }),
+                slip("units", `robot.toml: wheelbase_m is in ${name}`, "wheelbase_m", { turn: 1 / unit }),
+            ]),
+    ]);
+    if (kind === "velocity") {
+        slips.push(slip("degrees", "odometry.csv: omega_radps is in degrees", "omega_radps", { turn: DEGREE }));
+        slips.push(slip("stamps", "odometry.csv: time_us is in milliseconds", "time_us", { way: 1e3, turn: 1e3 }));
+    }
+    return slips;
+}
+
+/** How far way and turn of the flow are, as logarithms, from what these factors would mend. */
+function misfits(factors, flow) {
+    const turns = [flow.turn, flow.turnMost].filter((one) => Number.isFinite(one) && one !== 0)
+        .map(Math.abs).sort((a, b) => a - b);
+    const nearest = Math.min(Math.max(factors.turn, turns[0]), turns[turns.length - 1]);
+    const turn = turns.length ? nearest / factors.turn : 1;
+    const hasWay = Number.isFinite(flow.way) && flow.way !== 0;
+    const way = hasWay ? (Math.abs(flow.way) * factors.range) / factors.way : 1;
+    return [Math.abs(Math.log(way)), Math.abs(Math.log(turn))];
+}
+
+/** -1 for what runs against the sightings, without a doubt. */
+function signsOf(flow) {
+    return {
+        ...NO_FACTORS,
+        way: flow.way < -SURE_ERRORS * flow.wayError ? -1 : 1,
+        turn: flow.turn < -SURE_ERRORS * flow.turnError ? -1 : 1,
+    };
+}
+
+/** Whose sign is wrong. Mirrored bearings and swapped wheels look alike but for the hand of the map. */
+function signFindings(log, signed, flow, fitted) {
+    const isOneHand = new Set(fitted.map((one) => one.isMirrored)).size === 1;
+    const isMirrored = isOneHand && fitted[0].isMirrored;
+    const words = signWords(log);
+    let sure = signEvidence(flow, isOneHand ? fitted[0] : null);
+    const turns = signed.way === 1 && signed.turn === -1;
+    let found = words[`${signed.way},${signed.turn}`];
+    if (turns && !isOneHand) {
+        found = words.either;
+    } else if (turns && isMirrored) {
+        found = ["mirrored bearings", "bearings are mirrored", words.mirror];
+    } else if (!found && isMirrored) {
+        const file = fitted[0].what;
+        sure = `the map fits ${file} mirrored`;
+        found = ["mirrored bearings", `${file} is mirrored, or both bearings and wheels are`,
+            `multiply y_m of ${file} by -1; or ${words.mirror}, and ${words.swap}`];
+    }
+    return found ? [{ kind: found[0], what: found[1], sure, mend: found[2] }] : [];
+}
+
+function signWords(log) {
+    const [a, b] = ODOMETRY_COLUMNS[log.odometry.kind];
+    const isVelocity = log.odometry.kind === "velocity";
+    const swap = isVelocity ? `multiply ${b} by -1` : `exchange the columns ${a} and ${b}`;
+    const mirror = "multiply bearing_rad of sightings.csv by -1";
+    const swapped = isVelocity ? "the turn has the wrong sign" : "left and right wheel are swapped";
+    return {
+        swap, mirror,
+        "-1,-1": ["swapped wheels", "odometry runs backward", "change the sign of odometry"],
+        "-1,1": ["mount", "the sensor looks backward", "turn sensor_yaw_rad of robot.toml by pi"],
+        "1,-1": ["swapped wheels", swapped, swap],
+        either: ["mirrored bearings", `bearings are mirrored, or ${swapped}`, `${mirror}; or ${swap}`],
+    };
+}
+
+function signEvidence(flow, fitted) {
+    const [left, right] = [1, -1].map((sign) => sumOf(
+        flow.shifted.map((one, row) => Math.abs(one + sign * flow.turned[row]))) / flow.shifted.length);
+    const by = fitted
+        ? `; with that, the map fits ${fitted.what} ${fitted.isMirrored ? "mirrored" : "unmirrored"}`
+        : "; no beacons.csv or truth.csv tells which";
+    return `bearings show ${flow.turn.toFixed(3)} +- ${flow.turnError.toFixed(3)} of odometry's turn; they are off `
+        + `by ${left.toFixed(4)} rad on average as told, by ${right.toFixed(4)} with the sign changed${by}`;
+}

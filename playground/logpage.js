@@ -1,0 +1,177 @@
+"use strict";
+// A log on the page, in place of the room.
+
+const PLOT_ROWS_MAX = 4000;
+
+function bindFiles() {
+    element("files").addEventListener("change", (event) => {
+        loadFiles("log", [...event.target.files]);
+        event.target.value = ""; // so that the same may be chosen again
+    });
+    for (const name of ["dragenter", "dragover"]) {
+        window.addEventListener(name, (event) => {
+            event.preventDefault();
+            document.body.classList.add("dropping");
+        });
+    }
+    window.addEventListener("dragleave", (event) => {
+        document.body.classList.toggle("dropping", event.relatedTarget !== null);
+    });
+    window.addEventListener("drop", async (event) => {
+        event.preventDefault();
+        document.body.classList.remove("dropping");
+        const { name, files } = await droppedFiles(event.dataTransfer);
+        loadFiles(name, files);
+    });
+}
+
+/** Checks a log and runs it. What is none is named, and the page stays as it is. */
+async function loadFiles(name, files) {
+    await orSay(async () => {
+        const checked = await checkLog(name, await logTexts(files));
+        await runLog(checked, usualChoices(checked.log));
+    });
+}
+
+async function runLog(checked, choices) {
+    await orSay(async () => {
+        say(`${checked.log.name}: runs`);
+        const replay = await new Replay(checked.log, { ...choices, recovery: false }).run();
+        page.shown = { checked, replay, result: evaluate(replay) };
+        page.roomChoices = page.roomChoices || readChoices();
+        writeChoices(choices);
+        setMode(true);
+        say("");
+        show();
+    });
+}
+
+/** Does it; a PageError becomes the page's message. */
+async function orSay(action) {
+    try {
+        await action();
+    } catch (error) {
+        if (!(error instanceof PageError)) {
+            throw error;
+        }
+        say(error.message);
+    }
+}
+
+function writeChoices(choices) {
+    WORDS.forEach((id) => (element(id).value = choices[id]));
+}
+
+function backToRoom() {
+    writeChoices(page.roomChoices);
+    page.shown = page.roomChoices = null;
+    setMode(false);
+    show();
+}
+
+function setMode(isLog) {
+    document.querySelectorAll(".room").forEach((one) => (one.hidden = isLog));
+    document.querySelectorAll(".log").forEach((one) => (one.hidden = !isLog));
+    element("title").textContent = isLog ? logTitle(page.shown.checked) : "A robot in a room";
+}
+
+/** The verdict first. */
+function logTitle({ log, findings }) {
+    const count = findings.length;
+    return `${log.name}: ${count} finding${count === 1 ? "" : "s"}`;
+}
+
+function showLog({ checked, replay, result }) {
+    const { poses } = replay;
+    const path = thinned(poses);
+    const truePath = thinned(result.truth);
+    const odometryPath = thinned(deadReckoning(checked.log));
+    const trueBeacons = result.trueBeacons.map((one) => ({ ...one, name: identityText(checked.log, one.id) }));
+    new MapView(element("map"), {
+        bounds: boundsOf([...path, ...truePath, ...trueBeacons, ...result.beacons]),
+        path, truePath, odometryPath, trueBeacons,
+        beacons: result.beacons.map((one) => ({ ...one, name: logName(checked.log, trueBeacons, one) })),
+        pose: poses[poses.length - 1],
+        truePose: Number.isFinite(lastKnown(result.truth)?.theta) ? lastKnown(result.truth) : null,
+    });
+    drawPlots(element("plots"), thinned(result.errors));
+    showFigures(logFigures(replay, result));
+    showFindings(checked);
+}
+
+function thinned(rows) {
+    const every = Math.ceil(rows.length / PLOT_ROWS_MAX) || 1;
+    return rows.filter((_, row) => row % every === 0);
+}
+
+function lastKnown(poses) {
+    return poses[poses.length - 1];
+}
+
+/** Of a mapped beacon, unless its true one bears the name already. */
+function logName(log, trueBeacons, beacon) {
+    if (beacon.label < 0) {
+        return `#${beacon.uid}`;
+    }
+    return trueBeacons.some((one) => one.id === beacon.label) ? "" : identityText(log, beacon.label);
+}
+
+function boundsOf(places) {
+    const bounds = { left: 0, right: 0, bottom: 0, top: 0 };
+    for (const { x, y } of places.filter((one) => Number.isFinite(one.x))) {
+        bounds.left = Math.min(bounds.left, x);
+        bounds.right = Math.max(bounds.right, x);
+        bounds.bottom = Math.min(bounds.bottom, y);
+        bounds.top = Math.max(bounds.top, y);
+    }
+    const margin = 0.5 + 0.03 * Math.max(bounds.right - bounds.left, bounds.top - bounds.bottom);
+    return { left: bounds.left - margin, right: bounds.right + margin, bottom: bounds.bottom - margin,
+        top: bounds.top + margin };
+}
+
+function logFigures(replay, result) {
+    const last = replay.poses[replay.poses.length - 1];
+    const counts = replay.ledger.counts;
+    const known = result.errors.map((row) => row[1]).filter(Number.isFinite);
+    const refused = Object.entries(replay.refusals).map(([name, count]) => `${count} ${name}`).join(", ");
+    const figures = [
+        ["time", `${lastOf(result.errors, 0).toFixed(1)} s`],
+        ["last pose x, y, heading", `${last.x.toFixed(2)}, ${last.y.toFixed(2)} m, ${last.theta.toFixed(2)} rad`],
+        ["beacons in the map", String(result.beacons.filter((one) => one.confirmed).length)],
+        ["sightings matched, new, not used", `${counts.right + counts.wrong}, ${counts.new}, ${counts.rejected}`],
+        ["inputs refused", refused || "none"],
+    ];
+    if (known.length) {
+        const largest = known.reduce((most, one) => Math.max(most, one), 0);
+        figures.push(["error mean, largest", `${centimetres(meanOf(result.errors, 1))}, ${centimetres(largest)}`]);
+    }
+    if (result.errors.some((row) => Number.isFinite(row[2]))) {
+        figures.push(["mean NEES (3 is right)", meanOf(result.errors, 2).toFixed(1)]);
+    }
+    if (Number.isFinite(result.mapError)) {
+        figures.push(["error of the map (RMSE)", centimetres(result.mapError)]);
+    }
+    if (known.length && result.isAligned) {
+        figures.push(["truth is", "in a frame of its own: aligned"]);
+    }
+    return figures;
+}
+
+function showFindings({ log, findings, untested }) {
+    const lines = findings.map(({ kind, what, sure, mend }) => (
+        paragraph(`${kind}: ${what}`, `sure: ${sure}`, `mend: ${mend}`)));
+    lines.push(...log.notes.map((note) => paragraph(`note: ${note}`)));
+    lines.push(...untested.map((one) => paragraph("", `not tested: ${one}`)));
+    element("findings").replaceChildren(...(findings.length ? [] : [paragraph("nothing was found")]), ...lines);
+}
+
+function paragraph(text, ...quietLines) {
+    const made = document.createElement("p");
+    made.textContent = text;
+    for (const line of quietLines) {
+        const small = document.createElement("small");
+        small.textContent = line;
+        made.append(small);
+    }
+    return made;
+}

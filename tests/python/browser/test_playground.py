@@ -1,0 +1,316 @@
+"""The playground in a browser: the same bits as on the host, logs that are dropped, the words of `check`."""
+
+import subprocess
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from bslam.core.slam import Slam
+from bslam.errors import BslamError
+from bslam.log import read_folder, write_folder
+from bslam.logcheck.check import check_folder
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
+from logcheck.drives import made_up, with_odometry, with_robot, with_sightings
+
+ROOT = Path(__file__).resolve().parents[3]
+FILE = ROOT / "out" / "playground" / "index.html"
+BEACONS_MAX = 80  # of mk/playground.mk
+FINGERPRINT_START = 0xCBF29CE484222325
+DROP = """files => {
+    const transfer = new DataTransfer();
+    for (const [name, text] of Object.entries(files)) {
+        transfer.items.add(new File([text], name));
+    }
+    window.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
+}"""
+
+
+@pytest.fixture(scope="session")
+def built() -> Path:
+    subprocess.run(["make", "--silent", str(FILE.relative_to(ROOT))], cwd=ROOT, check=True)
+    return FILE
+
+
+@pytest.fixture
+def playground(built: Path, page: Page) -> Page:
+    """The page, standing still."""
+    page.goto(built.as_uri())
+    page.evaluate("setPlaying(false)")
+    return page
+
+
+def texts_of(folder: Path) -> dict[str, str]:
+    return {path.name: path.read_text() for path in folder.iterdir()}
+
+
+def folder_of(log, path: Path) -> Path:
+    write_folder(log, path)
+    return path
+
+
+def figures(page: Page) -> str:
+    return page.locator("#figures").inner_text()
+
+
+# ---- one file ---------------------------------------------------------------------------------------------
+
+
+def test_playground_is_one_small_file_that_asks_for_nothing(built, page):
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    began = time.monotonic()
+    page.goto(built.as_uri())
+    expect(page.locator("#figures")).to_contain_text("beacons in the map")
+    assert time.monotonic() - began < 10.0
+    assert page.evaluate("page.drive.beacons.length") > 0
+    assert asked == [built.as_uri()]
+    assert built.stat().st_size <= 400_000
+
+
+@pytest.mark.parametrize("width", [360, 800, 1920])
+def test_playground_fits_its_window(playground, width):
+    playground.set_viewport_size({"width": width, "height": 740})
+    assert playground.evaluate("document.documentElement.scrollWidth") <= width
+    assert playground.locator("#map").bounding_box()["width"] > 0.6 * width
+
+
+def test_playground_legend_has_the_colours_of_the_lines(playground):
+    pairs = playground.evaluate(
+        """() => ["truth", "estimate", "odometry", "right", "wrong", "new", "rejected"].map(name => {
+            const swatch = document.querySelector(`#legend i.line.${name}`);
+            const pen = document.createElement("canvas").getContext("2d");
+            pen.fillStyle = themeColours()[name];
+            const probe = document.createElement("i");
+            probe.style.color = pen.fillStyle;
+            document.body.append(probe);
+            return [getComputedStyle(swatch).borderTopColor, getComputedStyle(probe).color];
+        })"""
+    )
+    assert all(legend == line for legend, line in pairs)
+    assert len({legend for legend, _ in pairs}) == 7
+
+
+# ---- the robot in its room --------------------------------------------------------------------------------
+
+
+def driven(page: Page, steps: int, **choices) -> dict:
+    """A drive with a slip and a carrying away, and all that went in and came out."""
+    return page.evaluate(
+        """([steps, choices]) => {
+            const drive = new Drive({ ...readChoices(), ...choices });
+            for (let step = 0; step < steps; step++) {
+                if (step === 100) drive.world.slip();
+                if (step === 250) drive.world.carryAway();
+                drive.step(step < 60 ? { forward: 1, turn: 0.3 } : null);
+            }
+            const inputs = drive.estimator.inputs.map(([what, ...rest]) => what === "odometry"
+                ? [what, ...rest.slice(0, 4)]
+                : [what, rest[0], rest[1].map(one => [one.bearingRad, isNaN(one.rangeM) ? null : one.rangeM,
+                    one.label])]);
+            return { inputs, settings: drive.settings, pose: drive.estimator.pose(),
+                fingerprint: drive.estimator.fingerprint(), beacons: drive.estimator.beacons(),
+                states: [...new Set(drive.sightings.map(one => one.verdict))], counts: drive.ledger.counts };
+        }""",
+        [steps, choices],
+    )
+
+
+def fed(settings: dict, inputs: list) -> Slam:
+    """The host's estimator after the same inputs."""
+    slam = Slam(settings, beacons_max=BEACONS_MAX)
+    for what, *rest in inputs:
+        if what == "odometry":
+            slam.odometry(*rest)
+            continue
+        time_us, seen = rest
+        bearings, ranges, labels = map(list, zip(*seen, strict=True)) if seen else ([], [], [])
+        ranges = [np.nan if one is None else one for one in ranges]
+        slam.sightings(time_us, bearings, ranges, labels, [True] * len(seen))
+    return slam
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"filter": "invariant", "association": "known"},
+        {"filter": "standard", "association": "mahalanobis", "wheelNoise": 0.3},
+        {"filter": "invariant", "association": "position", "beacons": 25},
+        {"filter": "smoother", "association": "known", "observation": "direction"},
+    ],
+    ids=lambda choices: "-".join(map(str, choices.values())),
+)
+def test_playground_state_is_the_hosts_to_the_bit(playground, choices):
+    drive = driven(playground, 400, **choices)
+    slam = fed(drive["settings"], drive["inputs"])
+    assert int(drive["fingerprint"], 16) == slam.fingerprint(FINGERPRINT_START)
+    pose = drive["pose"]
+    assert (pose["x"], pose["y"], pose["theta"]) == slam.pose()
+    assert tuple(pose["lower"]) == slam.pose_covariance_lower()
+    host = [(one.uid, one.label, one.x_m, one.y_m, *one.covariance[[0, 0, 1], [0, 1, 1]]) for one in slam.beacons()]
+    names = ("uid", "label", "x", "y", "xx", "xy", "yy")
+    assert [tuple(one[name] for name in names) for one in drive["beacons"]] == host
+    assert drive["counts"]["right"] > 500
+
+
+def test_playground_a_seed_decides_the_drive(playground):
+    prints = [driven(playground, 60, seed=seed)["fingerprint"] for seed in (5, 5, 6)]
+    assert prints[0] == prints[1] != prints[2]
+
+
+def test_playground_is_driven_by_keys(playground):
+    before = playground.evaluate("page.drive.world.pose")
+    playground.keyboard.down("ArrowUp")
+    playground.evaluate("takeSteps(50)")
+    playground.keyboard.up("ArrowUp")
+    after = playground.evaluate("page.drive.world.pose")
+    assert after["x"] - before["x"] > 0.8 and abs(after["y"] - before["y"]) < 0.4
+    expect(playground.locator("#self")).not_to_be_checked()
+    playground.evaluate("takeSteps(60)")  # it brakes, and stands
+    stands = playground.evaluate("page.drive.world.pose")
+    playground.evaluate("takeSteps(20)")
+    assert playground.evaluate("page.drive.world.pose") == stands
+
+
+def test_playground_pauses_steps_and_starts_anew(playground):
+    first = playground.evaluate("page.drive.world.step")
+    playground.get_by_role("button", name="Step").click()
+    assert playground.evaluate("page.drive.world.step") == first + 1
+    time_text = playground.locator("#figures td").first.inner_text()
+    playground.get_by_role("button", name="Go on").click()
+    expect(playground.locator("#figures td").first).not_to_have_text(time_text)
+    playground.get_by_role("button", name="Pause").click()
+    playground.locator("#association").select_option("mahalanobis")
+    assert playground.evaluate("page.drive.world.step === FIRST_STEPS")
+    assert playground.evaluate("page.drive.beacons.every(one => one.label === -1)")
+
+
+def test_playground_a_robot_that_is_carried_away_finds_itself(playground):
+    playground.evaluate("takeSteps(700); page.drive.world.carryAway(); takeSteps(5)")
+    assert playground.evaluate("lastOf(page.drive.errors, 1)") > 1.0
+    playground.evaluate("takeSteps(500)")
+    assert playground.evaluate("lastOf(page.drive.errors, 1)") < 0.3
+    assert "following" in figures(playground)
+
+
+# ---- logs -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["wheels", "ticks", "velocity"])
+def test_playground_a_dropped_log_ends_where_replay_does(playground, tmp_path, kind):
+    folder = folder_of(made_up(kind=kind), tmp_path / "drive")
+    playground.evaluate(DROP, texts_of(folder))
+    expect(playground.locator("#title")).to_have_text("log: 0 findings")
+    trace = run_log(read_folder(folder), RunOptions(sensor="recorded"))
+    poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
+    assert np.array_equal(np.array(poses), trace.pose)
+    beacons = playground.evaluate("page.shown.result.beacons.map(one => [one.x, one.y])")
+    assert beacons == [[one.x_m, one.y_m] for one in trace.beacons]
+    expect(playground.locator("#figures")).to_contain_text("error of the map")
+    playground.get_by_role("button", name="Back to the room").click()
+    expect(playground.locator("#title")).to_have_text("A robot in a room")
+
+
+def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
+    folder = folder_of(made_up(), tmp_path / "drive")
+    playground.evaluate(DROP, texts_of(folder))
+    expect(playground.locator("#title")).to_have_text("log: 0 findings")
+    playground.locator("#filter").select_option("standard")
+    playground.locator("#association").select_option("joint")
+    expect(playground.locator("#message")).to_be_hidden()
+    options = RunOptions(sensor="recorded", filter="standard", association="joint")
+    last = run_log(read_folder(folder), options).pose[-1]
+    playground.wait_for_timeout(300)
+    poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
+    assert poses[-1] == last.tolist()
+
+
+def scaled(text: str, column: str, factor: float, whole: bool = False) -> str:
+    """The text of a csv file with a column multiplied."""
+    head, *lines = text.splitlines()
+    place = head.split(",").index(column)
+    rows = [line.split(",") for line in lines]
+    for row in rows:
+        value = factor * float(row[place])
+        row[place] = str(round(value)) if whole else repr(value)
+    return "\n".join([head, *(",".join(row) for row in rows)]) + "\n"
+
+
+def cut(text: str, *parts: slice) -> str:
+    """The text of a csv file with these rows of it."""
+    head, *lines = text.splitlines()
+    return "\n".join([head, *(line for part in parts for line in lines[part])]) + "\n"
+
+
+def mirrored(log):
+    return with_sightings(log, bearing_rad=-log.sightings.bearing_rad)
+
+
+def swapped(log):
+    return with_odometry(log, a=log.odometry.b, b=log.odometry.a)
+
+
+def backward(log):
+    return with_odometry(log, a=-log.odometry.b, b=-log.odometry.a)
+
+
+def in_mm(log):
+    return with_sightings(log, range_m=1e3 * log.sightings.range_m)
+
+
+def turned(log):
+    yaw = np.pi - np.mod(-log.sightings.bearing_rad, 2 * np.pi)
+    return with_sightings(log, bearing_rad=yaw)
+
+
+SPOILT_LOGS = {
+    "mirrored": mirrored,
+    "mirrored, no truth": lambda log: replace(mirrored(log), beacons=None),
+    "swapped": swapped,
+    "backward": backward,
+    "sensor looks backward": turned,
+    "a mirrored map": lambda log: replace(log, beacons=replace(log.beacons, y_m=-log.beacons.y_m)),
+    "millimetres": in_mm,
+    "millimetres and mirrored": lambda log: mirrored(in_mm(log)),
+    "odometry in centimetres": lambda log: with_odometry(log, a=1e2 * log.odometry.a, b=1e2 * log.odometry.b),
+    "no identities": lambda log: with_sightings(log, beacon_id=np.full_like(log.sightings.beacon_id, -1)),
+    "another time": lambda log: with_sightings(log, time_us=log.sightings.time_us + 10**9),
+    "at rest": lambda log: with_odometry(log, a=0 * log.odometry.a, b=0 * log.odometry.b),
+    "good": lambda log: log,
+}
+SPOILT_FILES = {
+    "degrees": ("sightings.csv", lambda text: scaled(text, "bearing_rad", 180.0 / np.pi)),
+    "nanoseconds": ("sightings.csv", lambda text: scaled(text, "time_us", 1e3, True)),
+    "odometry in seconds": ("odometry.csv", lambda text: scaled(text, "time_us", 1e-6)),
+    "milliseconds": ("odometry.csv", lambda text: scaled(text, "time_us", 1e-3, True)),
+    "repeated": ("odometry.csv", lambda text: cut(text, slice(300), slice(297, None))),
+    "clock back": ("sightings.csv", lambda text: cut(text, slice(300, None), slice(300))),
+    "gap": ("odometry.csv", lambda text: cut(text, slice(500), slice(600, None))),
+}
+
+
+def words(findings) -> list[tuple[str, ...]]:
+    return [tuple(one[name] for name in ("kind", "what", "sure", "mend")) for one in findings]
+
+
+def both_say(page: Page, folder: Path) -> None:
+    """The page's findings are the host's, word by word and figure by figure."""
+    found = page.evaluate("async texts => (await checkLog('log', texts)).findings", texts_of(folder))
+    host = [vars(one) for one in check_folder(folder).findings if not one.is_note]
+    assert words(found) == words(host)
+
+
+@pytest.mark.parametrize("name", SPOILT_LOGS)
+def test_playground_says_of_a_spoilt_log_what_check_says(playground, tmp_path, name):
+    both_say(playground, folder_of(SPOILT_LOGS[name](made_up()), tmp_path / "drive"))
+
+
+def test_playground_says_of_spoilt_files_what_check_says(playground, tmp_path):
+    for name, (file, spoil) in SPOILT_FILES.items():
+        folder = folder_of(made_up(seconds=40.0), tmp_path / name)
+        (folder / file).write_text(spoil((folder / file).read_text()))
+        both_say(playground, folder)
