@@ -16,6 +16,8 @@ from bslam.errors import BslamError, did_you_mean
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
 from bslam.rig import Camera
 
+BUILD_IT = "run `make setup` in a clone, or install the package anew"
+
 
 class Library:
     """A build of the estimator: `ffi` and `lib` of cffi, and the names of its enums."""
@@ -24,7 +26,7 @@ class Library:
         try:
             module = import_module(extension_name(real, beacons_max))
         except ImportError as error:
-            raise BslamError(f"the C library is not built ({error}): run `make setup`") from error
+            raise BslamError(f"the C library is not built ({error}): {BUILD_IT}") from error
         self.real = real
         self.beacons_max = beacons_max
         self.ffi = module.ffi
@@ -275,4 +277,4 @@ def vision_library() -> VisionLibrary:
     try:
         return VisionLibrary(import_module(VISION_EXTENSION))
     except ImportError as error:
-        raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error
+        raise BslamError(f"the vision library is not built ({error}): {BUILD_IT}") from error

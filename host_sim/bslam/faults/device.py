@@ -26,6 +26,8 @@ _SHALLOW = "microbit/shallow.elf"
 
 def _built(name: str) -> None:
     """Has make build a file of build/. Raises BslamError with what it said."""
+    if not (ROOT / "Makefile").is_file():
+        raise BslamError("it takes the firmware's sources; allowed: `bslam faults` in a clone of bslam")
     done = subprocess.run(
         ["make", "--silent", f"build/{name}"], cwd=ROOT, capture_output=True, text=True, check=False
     )

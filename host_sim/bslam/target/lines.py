@@ -127,7 +127,9 @@ def open_line(target: str) -> Line:
 
 def allowed_targets() -> str:
     """In the words of an error. qemu:BOARD:FILM, too, with a film that the robot drives by."""
-    return f"host, {', '.join(f'qemu:{board}' for board in qemu_machines())}, serial:DEVICE, process:PROGRAM"
+    boards = ", ".join(f"qemu:{board}" for board in qemu_machines())
+    here = boards or "qemu:BOARD (in a clone of bslam, where `make firmware` builds its image)"
+    return f"host, {here}, serial:DEVICE, process:PROGRAM"
 
 
 class QemuLine:

@@ -14,7 +14,9 @@ from bslam.errors import BslamError
 try:
     from bslam.world.camera import _render  # type: ignore[attr-defined]
 except ImportError as error:
-    raise BslamError(f"the camera's ray caster is not built ({error}): run `make setup`") from error
+    raise BslamError(
+        f"the ray caster is not built ({error}): run `make setup` in a clone, or install the package anew"
+    ) from error
 
 Floats = NDArray[np.float64]
 ffi, lib = _render.ffi, _render.lib
