@@ -24,6 +24,7 @@ include mk/mcdc.mk
 include mk/soak.mk
 include mk/mutants.mk
 include mk/packages.mk
+include mk/examples.mk
 
 .PHONY: help
 help: ## list the targets

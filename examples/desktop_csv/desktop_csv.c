@@ -112,7 +112,7 @@ int main(int argc, char **argv)
     open_table(&odometry, argv[1], "odometry.csv");
     open_table(&sightings, argv[1], "sightings.csv");
     bool is_more = read_row(&sightings);
-    for (bool is_first = true; read_row(&odometry); is_first = false) {
+    for (bool is_first = strstr(odometry.header, "left_m") != NULL; read_row(&odometry); is_first = false) {
         const bslam_odometry_reading_t reading = {
             .time_us = (int64_t)value(&odometry, "time_us", -1),
             .source = strstr(odometry.header, "left_ticks") ? BSLAM_ODOMETRY_TICKS : BSLAM_ODOMETRY_WHEELS,
@@ -120,7 +120,7 @@ int main(int argc, char **argv)
             .right_ticks = (uint32_t)(int64_t)value(&odometry, "right_ticks", 0),
             .left_m = (float)value(&odometry, "left_m", NAN),
             .right_m = (float)value(&odometry, "right_m", NAN)};
-        // A frame goes in after the reading that covers it; one before the first reading starts the clock.
+        // A frame goes in after the reading that covers it; one before the first travel starts the clock.
         while (is_first && is_more && value(&sightings, "time_us", -1) < (double)reading.time_us) {
             is_more = take_frame(&sightings);
         }

@@ -83,10 +83,8 @@ def _corners_px(pose: Pose, x_m: float, y_m: float, facing_rad: float) -> NDArra
     return np.array(corners)
 
 
-def write_drive(folder: Path, seed: int) -> None:
-    """Pictures, and odometry of wheels that err by 0.05 m/s at each step and of which the left one slips."""
-    rng = np.random.default_rng(seed)
-    (folder / "pictures").mkdir(parents=True)
+def write_camera(folder: Path) -> None:
+    """camera.toml."""
     (folder / "camera.toml").write_text(
         f"fx_px = {FOCAL_PX}\nfy_px = {FOCAL_PX}\ncx_px = {WIDTH_PX / 2 - 0.5}\n"
         f"cy_px = {HEIGHT_PX / 2 - 0.5}\n"
@@ -94,6 +92,13 @@ def write_drive(folder: Path, seed: int) -> None:
         f"mount_yaw_rad = 0.0\ntag_m = {TAG_M}\nwheelbase_m = {WHEELBASE_M}\n",
         encoding="utf-8",
     )
+
+
+def write_drive(folder: Path, seed: int) -> None:
+    """Pictures, and odometry of wheels that err by 0.05 m/s at each step and of which the left one slips."""
+    rng = np.random.default_rng(seed)
+    (folder / "pictures").mkdir(parents=True)
+    write_camera(folder)
     rows = ["time_us,left_m,right_m"]
     for step in range(steps() + 1):
         if step % PICTURE_EVERY == 0:

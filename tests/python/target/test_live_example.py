@@ -17,13 +17,9 @@ from bslam.target.film import write_film
 ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "build" / "host" / "robot"
 EXAMPLE = ROOT / "examples" / "live_robot" / "live_robot.py"
-STEP_US, READINGS = 10_000, 400
-GOING, STANDING, TICKS = (
-    20,
-    100,
-    (73, 94),
-)  # readings; it looks while it stands, so that no computer is too slow
-LOOKING = range(GOING + 5, GOING + 15)
+STEP_US, READINGS, TICKS = 40_000, 90, (73, 94)
+GOING, STANDING = 10, 20  # readings; it looks while it stands: no computer is too slow for that
+LOOKING = (GOING + 2, GOING + 5, GOING + 8)
 M_PER_TICK, WHEELBASE_M, MOUNT_X_M = 2 * math.pi * 0.033 / 1440, 0.2, 0.05  # as the example has them
 SLIP = 0.95  # of the left wheel: odometry alone goes wrong
 TAGS = {1: (3.0, 0.2), 2: (2.5, 2.0), 3: (1.5, 3.0), 4: (0.3, 3.2)}
@@ -104,3 +100,14 @@ def test_a_device_that_is_none_is_one_line():
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert "'/dev/nowhere'" in line and "allowed: a device such as" in line
+
+
+def test_its_figures_are_those_of_the_microbit_s_image():
+    image = ROOT / "build" / "microbit" / "robot.elf"
+    printed = subprocess.run(["arm-none-eabi-size", image], capture_output=True, text=True, check=True).stdout
+    text, data, bss = map(int, printed.splitlines()[1].split()[:3])
+    readme = EXAMPLE.with_name("README.md").read_text(encoding="utf-8")
+    said = re.search(r"Flash ([\d,]+) bytes, RAM ([\d,]+) bytes", readme)
+    assert [int(one.replace(",", "")) for one in said.groups()] == pytest.approx(
+        [text + data, data + bss], rel=0.05
+    )

@@ -1,5 +1,5 @@
-// A made-up drive for the examples' robots: a circle of 0.8 m at 0.3 m/s among five tags, a left wheel that slips by
-// one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second.
+// A made-up drive for the examples' robots: a circle of 0.8 m at 0.3 m/s among five tags, a left wheel that
+// slips by one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second.
 #ifndef DRIVE_H
 #define DRIVE_H
 

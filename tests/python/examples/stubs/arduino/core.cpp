@@ -1,5 +1,5 @@
-// Arduino's core on this computer: the drive's wheels call the sketch's interrupts, edge for edge, and its clock
-// begins again amid the drive, as micros() does.
+// Arduino's core on this computer: the drive's wheels call the sketch's interrupts, edge for edge, and its
+// clock begins again amid the drive, as micros() does.
 #include "Arduino.h"
 
 #include <stdlib.h>

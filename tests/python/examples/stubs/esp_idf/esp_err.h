@@ -9,11 +9,11 @@
 
 typedef int esp_err_t;
 #define ESP_OK 0
-#define ESP_ERROR_CHECK(x)   \
-    do {                     \
+#define ESP_ERROR_CHECK(x) \
+    do { \
         if ((x) != ESP_OK) { \
-            abort();         \
-        }                    \
+            abort(); \
+        } \
     } while (0)
 
 #endif

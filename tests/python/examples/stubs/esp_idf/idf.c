@@ -7,9 +7,9 @@
 #include "freertos/task.h"
 
 struct pcnt_unit_t {
-    int side;       // of the robot: -1 left, 1 right
-    int rising;     // what a rising edge of A counts where B is low: 1, -1, 0
-    int watched;    // limits that have a watch point
+    int side;     // of the robot: -1 left, 1 right
+    int rising;   // what a rising edge of A counts where B is low: 1, -1, 0
+    int watched;  // limits that have a watch point
     bool accumulates, runs;
 };
 

@@ -1,0 +1,156 @@
+"""examples/desktop_csv, keep_the_map and camera_tags: built and run as their READMEs say."""
+
+import math
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bslam.cli import main
+from bslam.log import Log, Odometry, first_steps, write_folder
+from bslam.world.simulate import load_scenario, simulate
+from examples import tag_room
+from examples.building import EXAMPLES, build_as_its_readme_says, run
+
+# ---- desktop_csv -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def desktop_csv(tmp_path_factory: pytest.TempPathFactory, library: Path) -> Path:
+    return build_as_its_readme_says("desktop_csv", library, tmp_path_factory.mktemp("desktop_csv"))
+
+
+def log_of(kind: str) -> Log:
+    """A drive with real wheels' noise, the defaults; by wheel travel or by encoder counts."""
+    log = first_steps(simulate(load_scenario("paper_room"), 4, sigma_mps=0.05), 400)
+    robot = replace(
+        log.robot, wheel_noise="actuation", bearing_sigma_rad=0.0136, range_sigma_scale_m=1 / 0.009
+    )
+    log = replace(log, robot=robot, seeds=None, sightings=replace(log.sightings, signature=None))
+    if kind == "wheels":
+        return log
+    odometry, ticks_per_m = log.odometry, 20_000 / (2 * math.pi * 0.05)
+    counts = ((travel_m.cumsum() * ticks_per_m).round() % 2**16 for travel_m in (odometry.a, odometry.b))
+    robot = replace(
+        robot, left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=20_000, counter_bits=16
+    )
+    return replace(log, robot=robot, odometry=Odometry("ticks", odometry.time_us, *counts))
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "refuses"),
+    [
+        ("wheels", ["gate_d2=9"], 0),
+        ("ticks", ["ticks_per_revolution=20000"], 1),  # a frame before the counters' first row
+    ],
+)
+def test_desktop_csv_gives_what_replay_gives(
+    tmp_path: Path, desktop_csv: Path, kind: str, settings: list[str], refuses: int
+) -> None:
+    write_folder(log_of(kind), tmp_path / "drive")
+    words = [word for one in settings for word in ("--set", one)]
+    out = tmp_path / "out"
+    replayed = ["replay", "csv", str(tmp_path / "drive"), "--out", str(out), "--pictures", "0"]
+    assert main([*replayed, "--association", "known", *words]) == 0
+    done = run(desktop_csv, "drive", *settings, folder=tmp_path)
+    path = (out / "drive.estimate.tum").read_text().splitlines()
+    assert done.stdout.splitlines() == path[-len(done.stdout.splitlines()) :]
+    assert len(done.stdout.splitlines()) == 400
+    *beacons, refused = done.stderr.splitlines()
+    rows = [row.split(",") for row in (out / "drive.map.csv").read_text().splitlines()[1:]]
+    assert beacons == [f"beacon {label}: x {x_m} m, y {y_m} m" for label, x_m, y_m, *_ in rows]
+    assert len(beacons) >= 4 and refused == f"{refuses} rows and frames refused"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "arguments: allowed: FOLDER"),
+        (["nowhere"], "nowhere/odometry.csv: its header: cannot be read"),
+        (["drive", "wheelbase=0.3"], "setting: wheelbase=0.3: allowed: NAME=VALUE"),
+        (["drive", "wheelbase_m=-1"], "setting: wheelbase_m=-1: allowed: NAME=VALUE"),
+        (["bad"], "bad/odometry.csv: left_m: 40000,1 cm,0.1"),
+    ],
+)
+def test_desktop_csv_says_in_a_line_what_is_bad(
+    tmp_path: Path, desktop_csv: Path, words: list[str], says: str
+) -> None:
+    for folder, travel in (("drive", "0.1"), ("bad", "1 cm")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "odometry.csv").write_text(f"time_us,left_m,right_m\n40000,{travel},0.1\n")
+        (tmp_path / folder / "sightings.csv").write_text("time_us,beacon_id,bearing_rad\n0,1,0.1\n")
+    done = run(desktop_csv, *words, folder=tmp_path, expect=2)
+    assert done.stderr.startswith(f"desktop_csv: {says}")
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+# ---- keep_the_map ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def keep_the_map(tmp_path_factory: pytest.TempPathFactory, library: Path) -> Path:
+    return build_as_its_readme_says("keep_the_map", library, tmp_path_factory.mktemp("keep_the_map"))
+
+
+def errors_of(printed: str) -> tuple[float, float]:
+    """Position, m, and heading, rad."""
+    (line,) = (line for line in printed.splitlines() if line.startswith("at x"))
+    x, y, heading, true_x, true_y, true_heading = map(float, re.findall(r"-?\d+\.\d+", line))
+    return math.dist((x, y), (true_x, true_y)), abs(math.remainder(heading - true_heading, 2 * math.pi))
+
+
+def test_keep_the_map_saves_loads_and_finds_itself(tmp_path: Path, keep_the_map: Path) -> None:
+    first = run(keep_the_map, folder=tmp_path).stdout
+    assert "found" not in first and re.search(r"room.bslam: saved, 5 beacons, \d+ bytes", first)
+    kept = (tmp_path / "room.bslam").read_bytes()
+    assert kept.startswith(b"BSLM") and not (tmp_path / "room.bslam.new").exists()
+    for _ in range(2):
+        again = run(keep_the_map, folder=tmp_path).stdout
+        assert again.startswith("room.bslam: BSLAM_OK")
+        found = re.search(r"after (\d+\.\d+) s: found", again)
+        assert found is not None and float(found[1]) < 10
+        position_m, heading_rad = errors_of(again)
+        assert position_m < 0.05 and heading_rad < 0.05
+
+
+def test_keep_the_map_refuses_a_damaged_map_and_leaves_it(tmp_path: Path, keep_the_map: Path) -> None:
+    run(keep_the_map, folder=tmp_path)
+    path = tmp_path / "room.bslam"
+    damaged = bytearray(path.read_bytes())
+    damaged[100] ^= 1
+    path.write_bytes(damaged)
+    said = run(keep_the_map, folder=tmp_path, expect=1).stdout
+    assert said == "room.bslam: BSLAM_E_MAP, bslam_map_fault_t 6, 0 beacons\n"  # BSLAM_MAP_BAD_CRC
+    assert path.read_bytes() == damaged
+    said = run(keep_the_map, "nowhere/room.bslam", folder=tmp_path, expect=1).stdout
+    assert "nowhere/room.bslam: No such file or directory" in said
+
+
+# ---- camera_tags -------------------------------------------------------------------------------------------
+
+CAMERA_TAGS = EXAMPLES / "camera_tags" / "camera_tags.py"
+
+
+def test_camera_tags_maps_the_room(tmp_path: Path) -> None:
+    tag_room.write_drive(tmp_path, seed=1)
+    printed = run(sys.executable, CAMERA_TAGS, tmp_path, folder=tmp_path).stdout
+    x_m, y_m, heading_rad = map(float, re.findall(r"-?\d+\.\d+", printed.splitlines()[0]))
+    true_x, true_y, true_heading = tag_room.pose_at(tag_room.steps())
+    # The left wheel slips by 2 %: by odometry alone the heading would be 0.6 rad off.
+    assert math.dist((x_m, y_m), (true_x, true_y)) < 0.06
+    assert abs(math.remainder(heading_rad - true_heading, 2 * math.pi)) < 0.03
+    rows = re.findall(r"tag (\d+): x (\S+) m, y (\S+) m, sd (\S+) m", printed)
+    tags = {int(number): (float(x), float(y), float(sd)) for number, x, y, sd in rows}
+    true_tags = {number: (x, y) for number, x, y, _ in tag_room.TAGS}
+    assert set(tags) == set(true_tags)
+    for number, (tag_x, tag_y, sd_m) in tags.items():
+        error_m = math.dist((tag_x, tag_y), true_tags[number])
+        assert error_m < 0.08 and error_m < 3 * sd_m
+
+
+def test_camera_tags_says_that_there_is_no_picture(tmp_path: Path) -> None:
+    tag_room.write_camera(tmp_path)
+    done = run(sys.executable, CAMERA_TAGS, tmp_path, folder=tmp_path, expect=1)
+    assert "no picture there; allowed: TIME_US.png" in done.stderr
