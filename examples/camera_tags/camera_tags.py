@@ -12,9 +12,9 @@ import csv
 import math
 import sys
 import tomllib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,6 +24,8 @@ from bslam import Slam
 
 CORNER_SD_PX = 0.5  # how far off the detector's corners are: let it look at a tag while nothing moves
 RANGE_SCALE_SD = 0.015  # and by what part a tag's distances err alike: its corners come out a little inside
+
+Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -68,13 +70,13 @@ class TagDetector:
         family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
         self._detector = cv2.aruco.ArucoDetector(family, parameters)
 
-    def find(self, picture: NDArray[np.uint8]) -> list[Seen]:
-        """The tags in a picture, (height, width)."""
+    def find(self, picture: Picture) -> list[Seen]:
+        """The tags in a picture."""
         corners, numbers, _ = self._detector.detectMarkers(picture)
-        found = [] if numbers is None else numbers.ravel().tolist()
+        found = [] if numbers is None else [int(number) for number in numbers.ravel()]
         return [self._seen(label, four) for label, four in zip(found, corners, strict=True)]
 
-    def _seen(self, label: int, corners_px: NDArray[np.float32]) -> Seen:
+    def _seen(self, label: int, corners_px: NDArray[Any]) -> Seen:
         """From the tag's place alone, x right, z ahead. Its orientation is left out: it has two solutions."""
         _, _, place = cv2.solvePnP(
             self._corners_m,
@@ -90,9 +92,25 @@ class TagDetector:
         return Seen(label, math.atan2(-x_m, z_m), range_m, bearing_sd_rad, max(range_sd_m, 0.005))
 
 
-def pictures_of(drive: Path) -> Iterator[tuple[int, Path]]:
-    """Time stamps and files, in the order of time."""
-    yield from sorted((int(path.stem), path) for path in (drive / "pictures").glob("*.png"))
+def read_grey(path: Path) -> Picture:
+    """A picture, (height, width)."""
+    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if picture is None:
+        raise SystemExit(f"{path}: no picture that OpenCV reads")
+    return np.asarray(picture, np.uint8)
+
+
+def feed(slam: Slam, time_us: int, seen: list[Seen]) -> None:
+    """What one picture shows; none is news, too."""
+    slam.sightings(
+        time_us,
+        [one.bearing_rad for one in seen],
+        [one.range_m for one in seen],
+        [one.label for one in seen],
+        [True] * len(seen),
+        [one.bearing_sd_rad for one in seen],
+        [one.range_sd_m for one in seen],
+    )
 
 
 def map_drive(drive: Path) -> Slam:
@@ -101,7 +119,7 @@ def map_drive(drive: Path) -> Slam:
     detector = TagDetector(camera)
     names = ("wheelbase_m", "mount_x_m", "mount_y_m", "mount_yaw_rad")
     slam = Slam({name: getattr(camera, name) for name in names} | {"range_scale_sd": RANGE_SCALE_SD})
-    pictures = list(pictures_of(drive))
+    pictures = sorted((int(path.stem), path) for path in (drive / "pictures").glob("*.png"))
     if not pictures:
         raise SystemExit(
             f"{drive}/pictures: no picture there; allowed: TIME_US.png, times as in odometry.csv"
@@ -113,18 +131,13 @@ def map_drive(drive: Path) -> Slam:
             slam.odometry("wheels", time_us, float(row["left_m"]), float(row["right_m"]))
             while pictures and pictures[0][0] <= time_us:  # a picture after the reading that covers it
                 taken_us, path = pictures.pop(0)
-                seen = detector.find(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
-                columns = [
-                    [getattr(one, name) for one in seen] for name in ("bearing_rad", "range_m", "label")
-                ]
-                noise = [[getattr(one, name) for one in seen] for name in ("bearing_sd_rad", "range_sd_m")]
-                slam.sightings(taken_us, *columns, [True] * len(seen), *noise)
+                feed(slam, taken_us, detector.find(read_grey(path)))
     return slam
 
 
 if __name__ == "__main__":
-    result = map_drive(Path(sys.argv[1]))
-    print("robot: x {:.3f} m, y {:.3f} m, heading {:.3f} rad".format(*result.pose()))
-    for beacon in result.beacons():
+    slam = map_drive(Path(sys.argv[1]))
+    print("robot: x {:.3f} m, y {:.3f} m, heading {:.3f} rad".format(*slam.pose()))
+    for beacon in slam.beacons():
         sd_m = math.sqrt(max(beacon.covariance[0][0], beacon.covariance[1][1]))
         print(f"tag {beacon.label}: x {beacon.x_m:.3f} m, y {beacon.y_m:.3f} m, sd {sd_m:.3f} m")

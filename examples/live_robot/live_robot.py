@@ -72,10 +72,13 @@ def follow(robot: RemoteSlam, told: queue.SimpleQueue[Seen | None]) -> None:
             now_us = one.time_us
             x_m, y_m, heading_rad = one.report.step.pose
             print(f"{now_us} {x_m:.3f} {y_m:.3f} {heading_rad:.3f}", flush=True)
-        while now_us is not None and not told.empty():
+        while not told.empty():
             seen = told.get()
             if seen is None:
                 return
+            if now_us is None:
+                print(f"tag {seen.label} before the robot said what time it is: left out", file=sys.stderr)
+                continue
             try:
                 robot.sightings(
                     now_us - seen.age_us, [seen.bearing_rad], [seen.range_m], [seen.label], [True]

@@ -1,6 +1,6 @@
 // A robot with wheel encoders on interrupts and a tag detector on Serial1; its pose comes out on Serial.
 // For boards of 32 bits with 22 KB of RAM to spare: RP2040, ESP32, Nano 33, Teensy, Due.
-#include <bslam/bslam.h>
+#include <bslam.h>
 
 // Your robot: pins of each encoder's two channels, and its measures (docs/TUNING.md says how to find them).
 const int LEFT_A = 2, LEFT_B = 4, RIGHT_A = 3, RIGHT_B = 5;

@@ -6,6 +6,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from bslam.cli import main
@@ -148,6 +150,24 @@ def test_camera_tags_maps_the_room(tmp_path: Path) -> None:
     for number, (tag_x, tag_y, sd_m) in tags.items():
         error_m = math.dist((tag_x, tag_y), true_tags[number])
         assert error_m < 0.08 and error_m < 3 * sd_m
+
+
+def test_two_orientations_of_a_tag_share_its_place() -> None:
+    """What the README gives as the reason to take bearing and distance alone."""
+    half_m, matrix = tag_room.TAG_M / 2, np.diag([tag_room.FOCAL_PX, tag_room.FOCAL_PX, 1.0])
+    corners_m = half_m * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]], np.float64)
+    facing = cv2.Rodrigues(np.array([0.0, 0.3, 0.0]))[0] @ np.diag(
+        [1.0, -1.0, -1.0]
+    )  # turned away by 17 degrees
+    place = np.array([0.2, 0.0, 2.5])
+    corners_px, _ = cv2.projectPoints(corners_m, cv2.Rodrigues(facing)[0], place, matrix, None)
+    flags = cv2.SOLVEPNP_IPPE_SQUARE
+    _, turns, places, errors_px = cv2.solvePnPGeneric(corners_m, corners_px, matrix, None, flags=flags)
+    first, second = (cv2.Rodrigues(turn)[0] for turn in turns)
+    apart_rad = math.acos((np.trace(first.T @ second) - 1) / 2)
+    assert apart_rad > math.radians(20) and float(np.max(errors_px)) < 0.5
+    ranges_m = [float(np.linalg.norm(one)) for one in places]
+    assert ranges_m[0] == pytest.approx(ranges_m[1], rel=0.01)
 
 
 def test_camera_tags_says_that_there_is_no_picture(tmp_path: Path) -> None:

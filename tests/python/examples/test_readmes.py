@@ -59,3 +59,15 @@ def test_figures_are_those_that_make_prints(sizes: dict[str, tuple[int, int]]) -
 def test_links_lead_to_files(path: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", path.read_text(encoding="utf-8")):
         assert (path.parent / target).exists(), target
+
+
+def test_examples_include_the_public_headers_only() -> None:
+    headers = [
+        header
+        for path in EXAMPLES.rglob("*")
+        if path.suffix in CODE - {".py"}
+        for header in re.findall(
+            r'#include ["<]((?:\w+/)*bslam[\w/]*\.h|(?:base|vision)/\S+)[">]', path.read_text()
+        )
+    ]
+    assert len(headers) == 5 and set(headers) == {"bslam/bslam.h", "bslam.h"}

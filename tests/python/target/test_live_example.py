@@ -94,6 +94,14 @@ def test_it_watches_the_robot_and_tells_it_of_the_tags(device):
     assert all(math.dist(tags[n], TAGS[n]) < 0.1 for n in TAGS)
 
 
+def test_without_wheels_it_ends_with_the_detector():
+    """A robot that reports nothing has told no time, which a sighting needs."""
+    command = [sys.executable, EXAMPLE, f"process:{ROBOT}"]
+    done = subprocess.run(command, input="0 7 0 2000\n", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "tag 7 before the robot said what time it is: left out\n"
+
+
 def test_a_device_that_is_none_is_one_line():
     command = [sys.executable, EXAMPLE, "serial:/dev/nowhere"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
