@@ -6,7 +6,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -154,20 +153,14 @@ def test_camera_tags_maps_the_room(tmp_path: Path) -> None:
 
 def test_two_orientations_of_a_tag_share_its_place() -> None:
     """What the README gives as the reason to take bearing and distance alone."""
-    half_m, matrix = tag_room.TAG_M / 2, np.diag([tag_room.FOCAL_PX, tag_room.FOCAL_PX, 1.0])
-    corners_m = half_m * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]], np.float64)
-    facing = cv2.Rodrigues(np.array([0.0, 0.3, 0.0]))[0] @ np.diag(
-        [1.0, -1.0, -1.0]
-    )  # turned away by 17 degrees
-    place = np.array([0.2, 0.0, 2.5])
-    corners_px, _ = cv2.projectPoints(corners_m, cv2.Rodrigues(facing)[0], place, matrix, None)
-    flags = cv2.SOLVEPNP_IPPE_SQUARE
-    _, turns, places, errors_px = cv2.solvePnPGeneric(corners_m, corners_px, matrix, None, flags=flags)
-    first, second = (cv2.Rodrigues(turn)[0] for turn in turns)
-    apart_rad = math.acos((np.trace(first.T @ second) - 1) / 2)
-    assert apart_rad > math.radians(20) and float(np.max(errors_px)) < 0.5
-    ranges_m = [float(np.linalg.norm(one)) for one in places]
-    assert ranges_m[0] == pytest.approx(ranges_m[1], rel=0.01)
+    half_m, place_m = tag_room.TAG_M / 2, np.array([0.0, 0.0, 2.5])
+    corners_m = half_m * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float64)
+    seen_px = []
+    for lean_rad in (0.3, -0.3):  # 34 degrees apart
+        turn = np.array([[math.cos(lean_rad), 0, math.sin(lean_rad)], [0, 1, 0], [-math.sin(lean_rad), 0, 1]])
+        at_m = corners_m @ turn.T + place_m
+        seen_px.append(tag_room.FOCAL_PX * at_m[:, :2] / at_m[:, 2:])
+    assert np.abs(seen_px[0] - seen_px[1]).max() < 0.5  # as far as a detector's corners are off
 
 
 def test_camera_tags_says_that_there_is_no_picture(tmp_path: Path) -> None:
