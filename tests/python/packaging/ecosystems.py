@@ -1,7 +1,7 @@
-"""Asks the package tools of PlatformIO, ESP-IDF, Zephyr and Arduino whether they take the C library's packages.
+"""Asks the tools of PlatformIO, ESP-IDF, Zephyr and Arduino whether they take the C library's packages.
 
-`make check-packages` runs it in an environment that has those tools. No board's compiler is needed: PlatformIO
-builds for this computer, by a platform that is written here, with SCons from the Python index.
+`make check-packages` runs it in an environment with those tools. No board's compiler is needed: PlatformIO
+builds for this computer, by a platform that is written here, with SCons of the Python index.
 
 Exit status 0: all that are here take it. 1: one does not, see above.
 """
@@ -37,7 +37,7 @@ WANTED = "from platformio.dependencies import *; print(get_core_dependencies()['
 SCONS = "from SCons.Script import main\nmain()\n"
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """What a tool said."""
 
 
@@ -51,7 +51,7 @@ def run(*command: object, folder: Path, **words: str) -> str:
         check=False,
     )
     if done.returncode != 0:
-        raise Refused(f"{' '.join(map(str, command[:4]))}\n{done.stdout}{done.stderr}")
+        raise RefusedError(f"{' '.join(map(str, command[:4]))}\n{done.stdout}{done.stderr}")
     return done.stdout
 
 
@@ -69,7 +69,7 @@ def files_in(archive: Path) -> set[str]:
 def same_files(made: Path, ours: Path) -> None:
     """The tool's own archive has what ours has."""
     if files_in(made) != files_in(ours):
-        raise Refused(f"{made.name} and {ours.name} differ in {sorted(files_in(made) ^ files_in(ours))}")
+        raise RefusedError(f"{made.name} and {ours.name} differ in {sorted(files_in(made) ^ files_in(ours))}")
 
 
 # ---- PlatformIO --------------------------------------------------------------------------------------------
@@ -116,10 +116,10 @@ def platformio(archive: Path, work: Path) -> str:
     built = project / ".pio/build/here"
     said = run(built / "program", folder=project)
     members = run("ar", "t", next(built.rglob("libbslam.a")), folder=project).split()
-    sources = [path for path in package.rglob("*.c")]
+    sources = list(package.rglob("*.c"))
     if len(members) != len(sources):
-        raise Refused(f"{len(members)} objects of {len(sources)} sources")
-    return f"pkg pack; a project of this computer with it builds ({len(members)} objects) and says: {said.strip()}"
+        raise RefusedError(f"{len(members)} objects of {len(sources)} sources")
+    return f"pkg pack; a project for this computer has its {len(members)} objects and says: {said.strip()}"
 
 
 # ---- the others --------------------------------------------------------------------------------------------
@@ -153,8 +153,8 @@ mapping:
 """
 
 
-def zephyr(archive: Path, work: Path) -> str:
-    """By west, of what is committed."""
+def zephyr(_archive: Path, work: Path) -> str:
+    """By west, of what is committed: the module is the repository."""
     revision = run("git", "rev-parse", "HEAD", folder=ROOT).strip()
     (work / "application").mkdir()
     manifest = MANIFEST.format(root=ROOT, revision=revision)
@@ -166,7 +166,7 @@ def zephyr(archive: Path, work: Path) -> str:
     (work / "schema.yml").write_text(MODULE, encoding="utf-8")
     run(TOOLS / "pykwalify", "-d", module / "zephyr/module.yml", "-s", work / "schema.yml", folder=work)
     if "bslam modules/bslam" not in listed or not (module / "zephyr/CMakeLists.txt").is_file():
-        raise Refused(f"west list: {listed}")
+        raise RefusedError(f"west list: {listed}")
     return "west update fetches the module; its module.yml is valid"
 
 
@@ -182,7 +182,7 @@ def arduino(archive: Path, work: Path) -> str:
 CHECKS: dict[str, tuple[str, Callable[[Path, Path], str]]] = {
     "PlatformIO": ("platformio", platformio),
     "ESP-IDF": ("esp-idf", esp_idf),
-    "Zephyr": ("amalgamation", zephyr),
+    "Zephyr": ("", zephyr),
     "Arduino": ("arduino", arduino),
 }
 
@@ -198,7 +198,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as work:
             try:
                 said = check(next(folder.glob(f"bslam-{archive}-*")), Path(work))
-            except Refused as error:
+            except RefusedError as error:
                 said, failed = f"REFUSED: {error}", True
         print(f"{name}: {said}", flush=True)
     return 1 if failed else 0
