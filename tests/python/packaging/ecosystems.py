@@ -170,13 +170,54 @@ def zephyr(_archive: Path, work: Path) -> str:
     return "west update fetches the module; its module.yml is valid"
 
 
+BOARDS = "pc.name=This computer\npc.build.core=core\npc.build.board=PC\n"
+RECIPES = """name=here
+version=1.0.0
+recipe.c.o.pattern=gcc -c -std=gnu17 {includes} "{source_file}" -o "{object_file}"
+recipe.cpp.o.pattern=g++ -c -std=gnu++17 {includes} "{source_file}" -o "{object_file}"
+recipe.ar.pattern=ar rcs "{archive_file_path}" "{object_file}"
+recipe.c.combine.pattern=g++ -o "{build.path}/program" {object_files} "{archive_file_path}" -lm
+recipe.preproc.macros=g++ -w -x c++ -E -CC {includes} "{source_file}" -o "{preprocessed_file_path}"
+tools.ctags.pattern=true "{source_file}"
+"""
+CORE = "void setup();\nvoid loop();\nint main()\n{\n    setup();\n    loop();\n    return 0;\n}\n"
+
+
 def arduino(archive: Path, work: Path) -> str:
-    lint = shutil.which("arduino-lint")
-    if lint is None:
-        return "left out: no arduino-lint on PATH"
+    """What is on PATH: the linter, which asks the web for names that are taken, and the build tool."""
     library = unpacked(archive, work / "libraries") / "bslam"
-    run(lint, "--library-manager", "false", "--compliance", "specification", library, folder=work)
-    return "arduino-lint"
+    said = []
+    if lint := shutil.which("arduino-lint"):
+        run(lint, "--library-manager", "false", "--compliance", "specification", library, folder=work)
+        said.append("arduino-lint finds no error")
+    if cli := shutil.which("arduino-cli"):
+        said.append(f"arduino-cli builds {arduino_objects(cli, library, work)} objects of it with a sketch")
+    return "; ".join(said) or "left out: neither arduino-lint nor arduino-cli is on PATH"
+
+
+def arduino_objects(cli: str, library: Path, work: Path) -> int:
+    """Of a sketch that includes the library, compiled for this computer."""
+    system = work / "hardware/here/here"
+    texts = {
+        system / "boards.txt": BOARDS,
+        system / "platform.txt": RECIPES,
+        system / "cores/core/Arduino.h": "",
+        system / "cores/core/main.cpp": CORE,
+        work
+        / "sketch/sketch.ino": "#include <bslam.h>\nstatic bslam_t robot;\nvoid setup() {}\nvoid loop() {}\n",
+        work / "cli.yaml": f"directories: {{data: {work}/data, user: {work}}}\n",
+        work / "data/library_index.json": '{"libraries": []}',
+    }
+    for path, text in texts.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    words = ("compile", "--config-file", "cli.yaml", "-b", "here:here:pc", "--build-path", "built", "sketch")
+    run(cli, *words, folder=work)
+    run(work / "built/program", folder=work)
+    objects = len(list((work / "built/libraries").rglob("*.c.o")))
+    if objects != len(list(library.rglob("*.c"))):
+        raise RefusedError(f"arduino-cli made {objects} objects")
+    return objects
 
 
 CHECKS: dict[str, tuple[str, Callable[[Path, Path], str]]] = {
