@@ -15,7 +15,7 @@ ECOSYSTEM_TOOLS := esp-idf-kconfig==3.14.0 idf-component-manager==3.1.2 packagin
     pykwalify==1.8.0 scons==4.11.1 west==1.5.0
 
 .PHONY: check-packages
-check-packages: packages build/ecosystems/installed ## PlatformIO, compote, west, arduino-lint take the packages
+check-packages: packages build/ecosystems/installed ## the same by PlatformIO, compote, west, Arduino's tools
 	@build/ecosystems/bin/python tests/python/packaging/ecosystems.py out/packages
 
 build/ecosystems/installed: mk/packages.mk
