@@ -125,15 +125,29 @@ def platformio(archive: Path, work: Path) -> str:
 # ---- the others --------------------------------------------------------------------------------------------
 
 
+# As a project's `dependencies: {bslam: {git: URL}}` is fetched.
+FROM_GIT = """import sys
+from idf_component_tools.manifest import SolvedComponent
+from idf_component_tools.sources import GitSource
+source = GitSource(git=sys.argv[1])
+found = source.versions("bslam").versions[0]
+solved = SolvedComponent(name="bslam", version=found.version, source=source, component_hash=found.component_hash)
+source.download(solved, "managed/bslam")
+"""
+MENU = "import esp_kconfiglib as k; print(k.Kconfig('Kconfig').syms['BSLAM_BEACONS_MAX'].str_value)"
+
+
 def esp_idf(archive: Path, work: Path) -> str:
     component = unpacked(archive, work / "bslam")
     run(TOOLS / "compote", "component", "pack", "--name", "bslam", folder=component)
     same_files(next(component.rglob("*.tgz")), archive)
-    script = (
-        "import esp_kconfiglib as k; c = k.Kconfig('Kconfig'); print(c.syms['BSLAM_BEACONS_MAX'].str_value)"
-    )
-    said = run(sys.executable, "-c", script, folder=component).strip()
-    return f"compote component pack; its Kconfig reads BSLAM_BEACONS_MAX={said}"
+    fetched = work / "managed/bslam"
+    fetched.mkdir(parents=True)
+    run(sys.executable, "-c", FROM_GIT, f"file://{ROOT}", folder=work)
+    if len(list(fetched.rglob("*.c"))) != len(list(component.rglob("*.c"))):
+        raise RefusedError(f"of git it fetches {len(list(fetched.rglob('*.c')))} sources")
+    said = run(sys.executable, "-c", MENU, folder=fetched).strip()
+    return f"compote component pack; fetched of git; its menu has BSLAM_BEACONS_MAX={said}"
 
 
 MANIFEST = """manifest:
