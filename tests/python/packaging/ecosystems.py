@@ -131,7 +131,8 @@ from idf_component_tools.manifest import SolvedComponent
 from idf_component_tools.sources import GitSource
 source = GitSource(git=sys.argv[1])
 found = source.versions("bslam").versions[0]
-solved = SolvedComponent(name="bslam", version=found.version, source=source, component_hash=found.component_hash)
+hashed = found.component_hash
+solved = SolvedComponent(name="bslam", version=found.version, source=source, component_hash=hashed)
 source.download(solved, "managed/bslam")
 """
 MENU = "import esp_kconfiglib as k; print(k.Kconfig('Kconfig').syms['BSLAM_BEACONS_MAX'].str_value)"
@@ -144,8 +145,9 @@ def esp_idf(archive: Path, work: Path) -> str:
     fetched = work / "managed/bslam"
     fetched.mkdir(parents=True)
     run(sys.executable, "-c", FROM_GIT, f"file://{ROOT}", folder=work)
-    if len(list(fetched.rglob("*.c"))) != len(list(component.rglob("*.c"))):
-        raise RefusedError(f"of git it fetches {len(list(fetched.rglob('*.c')))} sources")
+    names = {path.relative_to(fetched).as_posix() for path in fetched.rglob("*") if path.is_file()}
+    if names != files_in(archive):
+        raise RefusedError(f"of git it fetches others: {sorted(names ^ files_in(archive))}")
     said = run(sys.executable, "-c", MENU, folder=fetched).strip()
     return f"compote component pack; fetched of git; its menu has BSLAM_BEACONS_MAX={said}"
 
