@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bslam.algorithms import Algorithm
     from bslam.api import Run, RunWords, check, plot, run, simulate
     from bslam.core import CoreError, Slam
     from bslam.errors import BslamError
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
+    "Algorithm": "bslam.algorithms",
     "BslamError": "bslam.errors",
     "CoreError": "bslam.core",
     "Log": "bslam.log",
@@ -38,6 +40,7 @@ _HOMES = {
 """Where each name stands."""
 
 __all__ = [
+    "Algorithm",
     "BslamError",
     "CoreError",
     "Log",

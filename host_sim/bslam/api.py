@@ -5,7 +5,7 @@ Thin over `world`, `logcheck`, `runs`, `evaluation` and `view`, and with the wor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from matplotlib.figure import Figure
 
+from bslam.algorithms import Algorithm
 from bslam.commands.drawing import room, series
 from bslam.commands.report import table
 from bslam.core.slam import Slam
@@ -25,6 +26,8 @@ from bslam.log import Log
 from bslam.logcheck.check import check_folder
 from bslam.logcheck.finding import Report
 from bslam.options import Number, RunOptions
+from bslam.runs.methods import maker_of
+from bslam.runs.rival import run_algorithm
 from bslam.runs.runner import run_log
 from bslam.runs.sources import options_for, what_it_says
 from bslam.view.room import draw_room_in
@@ -113,11 +116,8 @@ def check(log: Log) -> Report:
     return replace(report, name=log.name)
 
 
-def run(log: Log, **words: Unpack[RunWords]) -> Run:
-    """Run the filter over a log, as `bslam replay csv` does with options of these names.
-
-    Raises BslamError for what is no option, or no value of one.
-    """
+def run(log: Log, algorithm: Callable[..., Algorithm] | None = None, **words: Unpack[RunWords]) -> Run:
+    """Run the filter over a log, as `bslam replay csv` does with options of these names. See `Log.run`."""
     for word in words:
         if word not in RunWords.__annotations__:
             allowed = ", ".join(RunWords.__annotations__)
@@ -129,7 +129,11 @@ def run(log: Log, **words: Unpack[RunWords]) -> Run:
         raise BslamError(f"parameters {parameters!r}: allowed is a mapping, names to numbers")
     given["parameters"] = tuple(parameters.items())
     options = options_for(what_it_says(log), given)
-    trace = run_log(log, options)
+    if algorithm is None:
+        trace = run_log(log, options)
+    else:  # whose covariance is of x, y, theta, and so are the filter's words for it
+        options = replace(options, filter="standard")
+        trace = run_algorithm(log, options, maker_of(algorithm), lambda step: None)
     return Run(log, options, trace, evaluate(log, trace, options))
 
 

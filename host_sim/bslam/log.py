@@ -263,12 +263,15 @@ class Log:
         """
         return bslam.check(self)
 
-    def run(self, **words: Unpack[bslam.RunWords]) -> bslam.Run:
+    def run(
+        self, algorithm: Callable[..., bslam.Algorithm] | None = None, **words: Unpack[bslam.RunWords]
+    ) -> bslam.Run:
         """Run the filter over the log, as `bslam replay csv` does with options of these names.
 
-        Raises BslamError for what is no option, or no value of one.
+        algorithm: a class of your own (docs/PLUGIN.md) to run in its place. Raises BslamError for what is no
+        option, or no value of one.
         """
-        return bslam.run(self, **words)
+        return bslam.run(self, algorithm, **words)
 
 
 def first_steps(log: Log, steps: int) -> Log:

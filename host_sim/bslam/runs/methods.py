@@ -124,10 +124,15 @@ def load_method(method: Method) -> Callable[[Setup], Algorithm]:
         classes = [word for word, one in vars(module).items() if inspect.isclass(one)]
         there = ", ".join(classes) or "none"
         raise BslamError(f"{place} has no class {name}; allowed: those that it has, {there}")
+    return maker_of(made, **dict(method.settings))
+
+
+def maker_of(made: Callable[..., Algorithm], **settings: Any) -> Callable[[Setup], Algorithm]:
+    """What makes the algorithm of a class from its setup. Raises BslamError for what is no such class."""
+    name = getattr(made, "__name__", repr(made))
     missing = [word for word in ("reset", "odometry", "observe", "pose", "map") if not hasattr(made, word)]
     if missing:
         raise BslamError(f"{name} has no {', '.join(missing)}; allowed: a class as in docs/PLUGIN.md")
-    settings = dict(method.settings)
     takes_setup = bool(inspect.signature(made).parameters)
     return (lambda setup: made(setup, **settings)) if takes_setup else (lambda setup: made(**settings))
 
