@@ -33,11 +33,7 @@ class Bag:
             from rosbags.typesys import Stores, get_types_from_msg, get_typestore
         except ImportError as error:
             raise BslamError(f"a bag needs the package rosbags, which is missing: {INSTALL}") from error
-        if path.suffix == ".bag":
-            made = f"rosbags-convert --src {path} --dst {path.with_suffix('')}"
-            raise BslamError(f"{path}: a bag of ROS 1; allowed: one of ROS 2, which `{made}` makes of it")
-        if not path.exists():
-            raise BslamError(f"{path}: no such bag; allowed: a rosbag2 folder, FILE.mcap or FILE.db3")
+        _require_bag(path)
         with _Guard(path):
             self._reader = Reader(path)
             self._reader.open()
@@ -92,17 +88,17 @@ class Bag:
         rest = [f"and {len(names) - _TOPICS_MAX} more"] if len(names) > _TOPICS_MAX else []
         return ", ".join([f"{name} ({self.topics[name]})" for name in names[:_TOPICS_MAX]] + rest)
 
-    def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, Any]]:
-        """Topic and message, in the order of the bag; a bar on a terminal says how far it is."""
+    def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+        """Topic, time of receipt in ns, and message, in order; a bar on a terminal says how far it is."""
         chosen = [one for one in self._reader.connections if one.topic in topics]
         store, total = self._typestore(chosen), sum(one.msgcount for one in chosen)
         if not chosen or total == 0:
             return
         with _Guard(self.path), tqdm(total=total, desc="messages", unit="msg", disable=None) as bar:
-            for connection, _, data in self._reader.messages(chosen):
+            for connection, received_ns, data in self._reader.messages(chosen):
                 message = store.deserialize_cdr(data, connection.msgtype)
                 bar.update()
-                yield connection.topic, message
+                yield connection.topic, received_ns, message
 
     def _typestore(self, connections: Sequence[Any]) -> Any:
         """Types for these topics: as the bag defines them, else as they are known here."""
@@ -120,6 +116,20 @@ class Bag:
         store = get_typestore(Stores.EMPTY)
         store.register(types)
         return store
+
+
+def _require_bag(path: Path) -> None:
+    allowed = "allowed: a rosbag2 folder (with metadata.yaml), FILE.mcap or FILE.db3"
+    if path.suffix == ".bag":
+        made = f"rosbags-convert --src {path} --dst {path.with_suffix('')}"
+        raise BslamError(f"{path}: a bag of ROS 1; allowed: one of ROS 2, which `{made}` makes of it")
+    if not path.exists():
+        raise BslamError(f"{path}: no such bag; {allowed}")
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        there = ", ".join(one.name for one in sorted(path.iterdir()) if one.suffix in (".mcap", ".db3"))
+        raise BslamError(f"{path}: no metadata.yaml in it (bags: {there or 'none'}); {allowed}")
+    if not path.is_dir() and path.suffix not in (".mcap", ".db3"):
+        raise BslamError(f"{path}: no bag; {allowed}")
 
 
 def _defined_in(connection: Any) -> dict[str, Any]:
@@ -156,6 +166,11 @@ class _Guard:
     ) -> None:
         if not isinstance(error, Exception) or isinstance(error, BslamError):
             return
-        said = " ".join(str(error).split()) or type(error).__name__
+        said = " ".join(str(error).split()).removesuffix(".") or type(error).__name__
+        if said.startswith("Profile"):
+            raise BslamError(
+                f"{self._path}: an mcap of another program; allowed: one of `ros2 bag`; of a recording "
+                "of bslam, `bslam export FILE --format csv` makes a log folder"
+            ) from error
         mend = "a recorder that was killed leaves such files: `mcap recover` or `ros2 bag reindex` mend them"
         raise BslamError(f"{self._path}: damaged, or no bag of ROS 2: {said}; {mend}") from error

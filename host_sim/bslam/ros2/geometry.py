@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 _UPRIGHT: Final = 0.5  # an axis whose level part is shorter points up or down
 DISTORTIONS: Final = ("", "plumb_bob", "rational_polynomial")
 _UNDISTORT_STEPS, _UNDISTORT_WITHIN = 50, 1e-4
+_CHI2_95: Final = 5.991  # two degrees of freedom
 _FIT_STEPS: Final = 40
 _FIT_WITHIN: Final = 1e-6  # of its sd: a step so small is the last
 _TILT_SD_RAD: Final = 1.0  # what is known of a tag's tilt before it is seen: holds those seen from the front
@@ -213,7 +214,7 @@ def place_tags(rays: Floats, side_m: Floats, ray_sd: float) -> tuple[Floats, Flo
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
     """Of (n, k, k) and (n, k); NaN where there is no solution."""
-    good: NDArray[np.bool_] = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    good = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
     good[good] &= np.abs(np.linalg.det(matrix[good])) > 0.0
     solution = np.full(right.shape, np.nan)
     solution[good] = np.linalg.solve(matrix[good], right[good][:, :, np.newaxis])[:, :, 0]
@@ -271,3 +272,20 @@ def _turned(vectors: Floats) -> Floats:
     safe = np.where(angle > 1e-12, angle, 1.0)
     turn = _cross(vectors)
     return np.eye(3) + np.sin(safe) / safe * turn + (1.0 - np.cos(safe)) / safe**2 * (turn @ turn)
+
+
+def frame_over(
+    pose: tuple[float, float, float], odometry: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """The pose of odometry's frame in the map's: x, y, heading of the robot in each of them are given."""
+    turn_rad = math.remainder(pose[2] - odometry[2], math.tau)
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    x_m, y_m = odometry[:2]
+    return pose[0] - c * x_m + s * y_m, pose[1] - s * x_m - c * y_m, turn_rad
+
+
+def ellipse_95(covariance_m2: Floats) -> tuple[float, float, float]:
+    """Axes (m, from end to end, the longer one first) and heading of the longer, rad; holds 95 %."""
+    (small, large), axes = np.linalg.eigh(covariance_m2)
+    long_m, short_m = (2.0 * math.sqrt(_CHI2_95 * max(0.0, float(one))) for one in (large, small))
+    return long_m, short_m, math.atan2(axes[1, 1], axes[0, 1])

@@ -92,6 +92,7 @@ class _Read:
     """All that one pass over the bag gives."""
 
     counts: dict[str, int] = field(default_factory=dict)
+    span_ns: dict[str, tuple[int, int]] = field(default_factory=dict)  # first and last receipt
     poses: Poses = field(default_factory=Poses)
     child: str = ""
     joints: Joints = field(default_factory=lambda: Joints(None, None))
@@ -206,8 +207,9 @@ def _read(bag: Bag, chosen: _Chosen, request: Request) -> _Read:
     if TF_STATIC in bag.topics:
         takers.append((TF_STATIC, lambda message: _take_static(read, message)))
     read.counts = {topic: 0 for topic, _ in takers}
-    for topic, message in bag.messages(sorted(read.counts)):
+    for topic, received_ns, message in bag.messages(sorted(read.counts)):
         read.counts[topic] += 1
+        read.span_ns[topic] = (read.span_ns.get(topic, (received_ns, 0))[0], received_ns)
         for name, take in takers:
             if name == topic:
                 take(message)
@@ -435,7 +437,7 @@ def _told(read: _Read, chosen: _Chosen, kinds: Mapping[str, str], log: Log, mark
     """What was read, a line a topic."""
     span_s = (log.odometry.time_us[-1] - log.odometry.time_us[0]) * 1e-6
     lines = [
-        f"{topic} ({kinds[topic]}): {count} messages" + (f", {count / span_s:.1f} Hz" if span_s > 0 else "")
+        f"{topic} ({kinds[topic]}): {count} messages{_rate(count, read.span_ns.get(topic))}"
         for topic, count in read.counts.items()
         if topic != TF_STATIC and topic not in chosen.cameras
     ]
@@ -452,3 +454,10 @@ def _told(read: _Read, chosen: _Chosen, kinds: Mapping[str, str], log: Log, mark
     if log.truth is not None:
         lines.append(f"truth: {len(log.truth.time_us)} poses")
     return lines
+
+
+def _rate(count: int, span_ns: tuple[int, int] | None) -> str:
+    if span_ns is None or span_ns[1] <= span_ns[0]:
+        return ""
+    span_s = (span_ns[1] - span_ns[0]) * 1e-9
+    return f" in {span_s:.1f} s, {(count - 1) / span_s:.1f} Hz"

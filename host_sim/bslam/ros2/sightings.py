@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ RANGE_LEFT: Final = 0.01
 """What calibration leaves: noise beside that of the corners; of a distance, a part of it."""
 _BEARING_SD_RAD, _RANGE_SD_M = (1e-5, math.pi), (1e-3, 1e4)  # as a log may have them
 _FARTHEST_M = 1e6
+_MIDDLE: Final = Mount(0.0, 0.0, 0.0)
+_COLUMNS: Final = ("bearing_rad", "range_m", "bearing_sd_rad", "range_sd_m", "label", "mappable")
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Markers:
     def mount(self) -> Mount:
         """The sensor of the log: the camera; the robot's middle, where there are several."""
         only = list(self.poses.values())
-        return Mount.of(only[0]) if len(only) == 1 else Mount(0.0, 0.0, 0.0)
+        return Mount.of(only[0]) if len(only) == 1 else _MIDDLE
 
     def placed(self, detections: Sequence[Detection]) -> list[Detection | None]:
         """Each with its place, which corners are turned into; None: it has none in front of the camera."""
@@ -76,6 +78,22 @@ class Markers:
         bearing_sd = math.hypot(bearing_sd, BEARING_LEFT_RAD)
         range_sd = math.hypot(range_sd, RANGE_LEFT * range_m)
         return bearing_rad, range_m, _within(bearing_sd, _BEARING_SD_RAD), _within(range_sd, _RANGE_SD_M)
+
+    def columns(self, frame: Frame, words: dict[str, int]) -> dict[str, list[Any]]:
+        """A frame as `Slam.sightings` takes it, seen from the robot's middle, with its detector's noise.
+
+        So the filter needs no mount, and any number of cameras will do. words: the labels of identities that
+        are no numbers; new ones are added.
+        """
+        columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+        for one in self.placed(frame.detections):
+            if one is not None:
+                number = one.identity.rpartition(":")[2]
+                label = int(number) if number.isdecimal() else words.setdefault(one.identity, len(words))
+                sight = self.sight(frame.frame_id, one, _MIDDLE)
+                for name, value in zip(_COLUMNS, (*sight, label, True), strict=True):
+                    columns[name].append(value)
+        return columns
 
 
 def _is_place(one: Detection) -> bool:

@@ -59,9 +59,9 @@ def travel_of_poses(told: Poses, topic: str, notes: list[str]) -> Travel:
     pose = np.array([(told.poses[i].x_m, told.poses[i].y_m, told.poses[i].theta_rad) for i in order])
     twist = np.array([told.twists[i] for i in order])
     _require_finite(np.hstack([pose, twist]), topic)
-    way_m, aside_m, turn_rad = _arcs(pose)
+    way_m, aside_m, turn_rad = arcs(pose)
     dt_s = np.diff(time_us) * 1e-6
-    by_twist = _is_jump(way_m, aside_m, dt_s)
+    by_twist = is_jump(way_m, aside_m, dt_s)
     if by_twist.any():
         notes.append(f"{topic}: the pose jumps {int(by_twist.sum())} times; there its speeds are taken")
     if not np.ptp(pose, axis=0).any() and twist.any():
@@ -77,8 +77,8 @@ def travel_of_poses(told: Poses, topic: str, notes: list[str]) -> Travel:
     return Travel(time_us, way_m, turn_rad)
 
 
-def _arcs(pose: Floats) -> tuple[Floats, Floats, Floats]:
-    """Way along the arc, way aside of it, and turn from pose to pose."""
+def arcs(pose: Floats) -> tuple[Floats, Floats, Floats]:
+    """Way along the arc, way aside of it, m, and turn, rad, from pose to pose of (n, 3): x, y, heading."""
     step_m, turn_rad = np.diff(pose[:, :2], axis=0), wrap_rad(np.diff(pose[:, 2]))
     heading_rad = pose[:-1, 2] + 0.5 * turn_rad
     ahead = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
@@ -87,7 +87,8 @@ def _arcs(pose: Floats) -> tuple[Floats, Floats, Floats]:
     return (step_m * ahead).sum(axis=1) / chord_over_arc, (step_m * aside).sum(axis=1), turn_rad
 
 
-def _is_jump(way_m: Floats, aside_m: Floats, dt_s: Floats) -> NDArray[np.bool_]:
+def is_jump(way_m: Floats, aside_m: Floats, dt_s: Floats) -> NDArray[np.bool_]:
+    """Whether an odometry that moves so far in so long was set anew."""
     moved_m = np.hypot(way_m, aside_m)
     return (moved_m > JUMP_M) & (moved_m > JUMP_MPS * dt_s)
 

@@ -24,7 +24,7 @@ OPTICAL = "camera_optical_frame"
 # Ahead of the robot's middle and to its left, 0.4 m up, turned left and tilted down.
 MOUNT = Transform.of_camera(0.12, 0.05, 0.3)
 TILT = Transform.of((math.sin(-0.1), 0.0, 0.0, math.cos(-0.1)), np.zeros(3))
-CAMERA_POSE = Transform(MOUNT.rotation, MOUNT.place_m + [0.0, 0.0, 0.4]).after(TILT)
+CAMERA_POSE = Transform(MOUNT.rotation, np.array([0.12, 0.05, 0.4])).after(TILT)
 CAMERA = Camera(400.0, 410.0, 640.0, 360.0, (1280, 720), "plumb_bob", (-0.05, 0.01, 1e-4, -1e-4, 0.0))
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -140,7 +140,7 @@ class Drive:
         return EPOCH_NS + int(time_us) * 1000
 
     def odometry(self) -> Iterator[Said]:
-        """Integrated poses with the wheels' speeds, as a base driver tells them; the first one at the start."""
+        """Integrated poses with the wheels' speeds, as a base driver tells them; the first at the start."""
         odometry, base_m = self.log.odometry, self.log.robot.wheelbase_m
         at = (1.0, -2.0, 0.5)  # odometry's own origin is of no account
         rows = [(0, 0.0, 0.0), *zip(odometry.time_us.tolist(), odometry.a, odometry.b, strict=True)]
@@ -169,7 +169,9 @@ class Drive:
         truth = self.log.truth
         assert truth is not None
         rates = np.remainder(np.diff(truth.theta_rad) + np.pi, 2 * np.pi) - np.pi
-        for time_us, rate in zip(truth.time_us[1:].tolist(), rates / self.log.robot.step_us * 1e6, strict=True):
+        for time_us, rate in zip(
+            truth.time_us[1:].tolist(), rates / self.log.robot.step_us * 1e6, strict=True
+        ):
             for part in range(4):
                 stamp = self.time_ns(time_us - part * self.log.robot.step_us // 4)
                 said = new("sensor_msgs/msg/Imu", header=header(stamp, "imu_link"))
@@ -182,7 +184,12 @@ class Drive:
         assert truth is not None
         for time_us, x, y, theta in zip(truth.time_us, truth.x_m, truth.y_m, truth.theta_rad, strict=True):
             kind, stamp = "geometry_msgs/msg/PoseStamped", self.time_ns(time_us)
-            yield stamp, "/mocap", kind, new(kind, header=header(stamp, "map"), pose=pose((x, y, 0), yawed(theta)))
+            yield (
+                stamp,
+                "/mocap",
+                kind,
+                new(kind, header=header(stamp, "map"), pose=pose((x, y, 0), yawed(theta))),
+            )
 
     def static(self) -> Iterator[Said]:
         """base_footprint over the robot's frame, a mast, the camera on it, and an IMU on its side."""
@@ -195,7 +202,12 @@ class Drive:
             transform(EPOCH_NS, "mast", OPTICAL, camera.place_m, quaternion(camera.rotation)),
             transform(EPOCH_NS, "base_link", "imu_link", (0, 0, 0), quaternion(imu.rotation)),
         ]
-        yield EPOCH_NS, "/tf_static", "tf2_msgs/msg/TFMessage", new("tf2_msgs/msg/TFMessage", transforms=frames)
+        yield (
+            EPOCH_NS,
+            "/tf_static",
+            "tf2_msgs/msg/TFMessage",
+            new("tf2_msgs/msg/TFMessage", transforms=frames),
+        )
 
     def camera_info(self) -> Iterator[Said]:
         c, kind = self.camera, "sensor_msgs/msg/CameraInfo"
@@ -206,7 +218,7 @@ class Drive:
         yield EPOCH_NS, "/camera/camera_info", kind, said
 
     def frames(self) -> Iterator[tuple[int, list[tuple[int, np.ndarray]]]]:
-        """By time in ns: the beacons seen, each with its place in the optical frame, 0.3 m over the ground."""
+        """By time in ns: the beacons seen, each with its place in the optical frame, 0.3 m up."""
         seen, mount = self.log.sightings, Mount.of(self.camera_pose)
         back = self.camera_pose.inverse()
         for time_us in np.unique(seen.time_us).tolist():
@@ -214,7 +226,9 @@ class Drive:
             places = []
             for row in rows:
                 angle = seen.bearing_rad[row] + mount.yaw_rad
-                ground = [mount.x_m, mount.y_m] + seen.range_m[row] * np.array([math.cos(angle), math.sin(angle)])
+                ground = [mount.x_m, mount.y_m] + seen.range_m[row] * np.array(
+                    [math.cos(angle), math.sin(angle)]
+                )
                 place = back.rotation @ np.array([*ground, 0.3]) + back.place_m
                 places.append((int(seen.beacon_id[row]), place))
             yield self.time_ns(time_us), places
@@ -224,7 +238,9 @@ class Drive:
         log, back = self.log, self.camera_pose.inverse()
         assert log.truth is not None and log.beacons is not None
         row_of = {time_us: row for row, time_us in enumerate(log.truth.time_us.tolist())}
-        at = {i: (x, y) for i, x, y in zip(log.beacons.beacon_id, log.beacons.x_m, log.beacons.y_m, strict=True)}
+        at = {
+            i: (x, y) for i, x, y in zip(log.beacons.beacon_id, log.beacons.x_m, log.beacons.y_m, strict=True)
+        }
         for time_ns, places in self.frames():
             row = row_of[(time_ns - EPOCH_NS) // 1000]
             theta = log.truth.theta_rad[row]
@@ -268,7 +284,7 @@ class Drive:
                 yield stamp, "/tf", kind, said
 
     def apriltags(self, pixel_sd: float = 0.2) -> Iterator[Said]:
-        """Corners of upright tags that face the camera more or less, seen without noise but that of corners."""
+        """Corners of upright tags that face the camera more or less; no noise but that of corners."""
         random = np.random.default_rng(8)
         kind = "apriltag_msgs/msg/AprilTagDetectionArray"
         square = SIDE_M * np.array([[-0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, -0.5, 0], [-0.5, -0.5, 0]])

@@ -1,0 +1,148 @@
+"""A node of ROS 2 around bslam: odometry and markers in; pose, map -> odom and the map out (README.md)."""
+
+import math
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rosidl_runtime_py.utilities import get_message
+from sensor_msgs.msg import CameraInfo
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from bslam import CoreError, Slam
+from bslam.ros2.geometry import ellipse_95, frame_over, pose_in
+from bslam.ros2.messages import CORNERS, ODOMETRY, camera_of, frames_of, poses_of, transforms_of
+from bslam.ros2.sightings import Markers
+from bslam.ros2.tags import TagSizes
+from bslam.ros2.wheels import arcs, is_jump
+
+PARAMETERS = {
+    "odometry": "/odom",
+    "detections": "/apriltag/detections",
+    "detections_type": "apriltag_msgs/msg/AprilTagDetectionArray",
+    "camera_info": "/camera/camera_info",
+    "rectified": True,  # the detector reads image_rect, as apriltag_ros does
+    "tag_size_m": 0.16,
+    "base_frame": "base_link",
+    "wheelbase_m": 0.3,
+    "wheel_speed_sd_mps": 0.05,
+    "bearing_sd_rad": 0.02,
+    "range_sd_fraction": 0.03,
+}
+JUMP_SD = 0.5, 0.5  # m and rad that the pose may be off after odometry was set anew
+FRAMES_PER_MAP = 10
+
+
+class BslamNode(Node):
+    """One robot; every pose it publishes is stamped as the odometry it came from."""
+
+    def __init__(self) -> None:
+        super().__init__("bslam")
+        p = {name: self.declare_parameter(name, value).value for name, value in PARAMETERS.items()}
+        self.p = p
+        speeds = dict.fromkeys(("left_speed_sd_mps", "right_speed_sd_mps"), p["wheel_speed_sd_mps"])
+        sensor = {name: p[name] for name in ("wheelbase_m", "bearing_sd_rad", "range_sd_fraction")}
+        self.slam = Slam({**sensor, **speeds}, beacons_max=80)
+        self.tree, self.camera, self.last, self.waiting = {}, None, None, []
+        self.words: dict[str, int] = {}  # labels of identities that are no numbers
+        self.frames = 0
+        self.pose_out = self.create_publisher(PoseWithCovarianceStamped, "~/pose", 10)
+        self.map_out = self.create_publisher(MarkerArray, "~/map", 10)
+        self.tf_out = self.create_publisher(TFMessage, "/tf", 100)
+        latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_subscription(TFMessage, "/tf_static", self.on_static, latched)
+        sensors, kind = qos_profile_sensor_data, get_message(p["detections_type"])
+        self.create_subscription(CameraInfo, p["camera_info"], self.on_camera, sensors)
+        self.create_subscription(Odometry, p["odometry"], self.on_odometry, sensors)
+        self.create_subscription(kind, p["detections"], self.on_detections, sensors)
+
+    def on_static(self, message) -> None:
+        self.tree |= {child: (parent, pose) for parent, child, pose in transforms_of(message)}
+
+    def on_camera(self, message) -> None:
+        self.camera = camera_of(message, self.p["rectified"])
+
+    def on_detections(self, message) -> None:
+        """They wait for the odometry that covers them, and are taken at their own stamps."""
+        self.waiting += frames_of(self.p["detections_type"], message)
+
+    def on_odometry(self, message) -> None:
+        (pose,) = poses_of(ODOMETRY, message)
+        now_us, at = pose.time_ns // 1000, (pose.x_m, pose.y_m, pose.theta_rad)
+        try:
+            if self.last is None:
+                self.slam.sightings(now_us, [], [], [], [])  # an empty frame starts the clock
+            else:
+                self.move(now_us, at)
+        except CoreError as refusal:  # a stamp that runs back, say: the next message covers this one's way
+            self.get_logger().warning(str(refusal))
+            return
+        self.last = now_us, at
+        self.waiting.sort(key=lambda frame: frame.time_ns)
+        while self.waiting and self.waiting[0].time_ns // 1000 <= now_us:
+            self.see(self.waiting.pop(0), message.header.stamp)
+        self.publish(message.header, at)
+
+    def move(self, now_us: int, at: tuple) -> None:
+        before_us, before = self.last
+        way_m, aside_m, turn_rad = (float(one[0]) for one in arcs(np.array([before, at])))
+        if is_jump(way_m, aside_m, (now_us - before_us) * 1e-6):
+            self.slam.resume_odometry(*JUMP_SD)
+            way_m = turn_rad = 0.0
+        half_m = 0.5 * turn_rad * self.p["wheelbase_m"]
+        self.slam.odometry("wheels", now_us, way_m - half_m, way_m + half_m)
+
+    def see(self, frame, stamp) -> None:
+        camera_pose = pose_in(self.tree, self.p["base_frame"], frame.frame_id)
+        if camera_pose is None or (self.camera is None and self.p["detections_type"] in CORNERS):
+            missing = "camera_info" if camera_pose else f"way to {frame.frame_id} in /tf_static"
+            self.get_logger().warning(f"frame left out: no {missing} yet", throttle_duration_sec=5.0)
+            return
+        sizes = TagSizes({}, self.p["tag_size_m"])
+        markers = Markers({frame.frame_id: camera_pose}, sizes, self.camera, pixel_sd=0.5)
+        try:
+            self.slam.sightings(frame.time_ns // 1000, **markers.columns(frame, self.words))
+        except CoreError as refusal:
+            self.get_logger().warning(str(refusal))
+        if self.frames % FRAMES_PER_MAP == 0:
+            self.map_out.publish(
+                MarkerArray(markers=[self.ellipse(one, stamp) for one in self.slam.beacons()])
+            )
+        self.frames += 1
+
+    def publish(self, header, odometry: tuple) -> None:
+        x_m, y_m, theta_rad = self.slam.pose()
+        out = PoseWithCovarianceStamped()
+        out.header.stamp, out.header.frame_id = header.stamp, "map"
+        _place(out.pose.pose.position, out.pose.pose.orientation, x_m, y_m, theta_rad)
+        covariance = np.zeros((6, 6))
+        covariance[np.ix_([0, 1, 5], [0, 1, 5])] = self.slam.pose_covariance()
+        out.pose.covariance = covariance.ravel()
+        self.pose_out.publish(out)
+        tf = TransformStamped(header=out.header, child_frame_id=header.frame_id)
+        _place(tf.transform.translation, tf.transform.rotation, *frame_over((x_m, y_m, theta_rad), odometry))
+        self.tf_out.publish(TFMessage(transforms=[tf]))
+
+    def ellipse(self, beacon, stamp) -> Marker:
+        """A flat cylinder that holds the beacon with 95 %."""
+        marker = Marker(ns="bslam", id=int(beacon.uid % 2**31), type=Marker.CYLINDER, action=Marker.ADD)
+        marker.header.stamp, marker.header.frame_id = stamp, "map"
+        long_m, short_m, yaw_rad = ellipse_95(beacon.covariance)
+        _place(marker.pose.position, marker.pose.orientation, beacon.x_m, beacon.y_m, yaw_rad)
+        marker.scale.x, marker.scale.y, marker.scale.z = max(long_m, 0.01), max(short_m, 0.01), 0.02
+        marker.color.g, marker.color.a = (1.0 if beacon.confirmed else 0.4), 0.7
+        return marker
+
+
+def _place(position, orientation, x_m: float, y_m: float, theta_rad: float) -> None:
+    position.x, position.y = float(x_m), float(y_m)
+    orientation.z, orientation.w = math.sin(0.5 * theta_rad), math.cos(0.5 * theta_rad)
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    rclpy.spin(BslamNode())

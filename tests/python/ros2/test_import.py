@@ -1,0 +1,306 @@
+"""Bags of simulated drives come back as the log they were made of."""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bslam.cli import main
+from bslam.evaluation.metrics import evaluate, summarise
+from bslam.log import Log, first_steps, read_folder
+from bslam.logcheck.check import check_log
+from bslam.options import RunOptions
+from bslam.ros2.importer import Request, import_bag
+from bslam.ros2.tags import TagSizes
+from bslam.runs.runner import run_log
+from ros2.bags import CAMERA, EPOCH_NS, MADE_UP, SIDE_M, STORE, Drive, Said, header, new, parts, write_bag
+
+EPOCH_US = EPOCH_NS // 1000
+SIZES = TagSizes({}, SIDE_M)
+OPTIONS = RunOptions(sensor="recorded")
+
+
+def imported(bag: Path, **request) -> Log:
+    return import_bag(bag, Request(robot={"wheelbase_m": 0.4}, **request)).log
+
+
+def assert_same_sightings(log: Log, direct: Log, within: float = 1e-9) -> None:
+    ours, theirs = log.sightings, direct.sightings
+    order = np.lexsort((theirs.beacon_id, theirs.time_us))
+    mine = np.lexsort((ours.beacon_id, ours.time_us))
+    np.testing.assert_array_equal(ours.time_us[mine] - EPOCH_US, theirs.time_us[order])
+    np.testing.assert_array_equal(ours.beacon_id[mine], theirs.beacon_id[order])
+    np.testing.assert_allclose(ours.bearing_rad[mine], theirs.bearing_rad[order], atol=within)
+    np.testing.assert_allclose(ours.range_m[mine], theirs.range_m[order], atol=within)
+
+
+def test_poses_of_markers_and_odometry_come_back(drive: Drive, aruco: Path) -> None:
+    log, direct = imported(aruco, truth="/mocap"), drive.log
+    assert_same_sightings(log, direct)
+    assert log.odometry.kind == "wheels"
+    np.testing.assert_array_equal(log.odometry.time_us - EPOCH_US, direct.odometry.time_us)
+    np.testing.assert_allclose(log.odometry.a, direct.odometry.a, atol=1e-12)
+    np.testing.assert_allclose(log.odometry.b, direct.odometry.b, atol=1e-12)
+    for name in ("sensor_x_m", "sensor_y_m", "sensor_yaw_rad"):
+        assert getattr(log.robot, name) == pytest.approx(getattr(direct.robot, name), abs=1e-9)
+    assert log.robot.wheel_noise == "actuation"
+    assert log.truth is not None and len(log.truth.time_us) == 601
+    assert log.truth.time_us[0] == EPOCH_US
+
+
+@pytest.mark.parametrize(
+    ("part", "topic", "plugin", "definitions"),
+    [
+        ("detections_3d", "/detections", "sqlite3", False),
+        ("opencv", "/aruco_detections", "sqlite3", True),
+        ("tag_frames", "/tf", "mcap", True),
+    ],
+)
+def test_other_markers_come_back(
+    tmp_path: Path, drive: Drive, part: str, topic: str, plugin: str, definitions: bool
+) -> None:
+    small = replace(drive, log=_beginning(drive.log))
+    said = parts(small.odometry(), getattr(small, part)(), small.static())
+    bag = write_bag(tmp_path / "bag", said, plugin, definitions)
+    assert_same_sightings(imported(bag, detections=topic), small.log)
+
+
+def _beginning(log: Log) -> Log:
+    return first_steps(log, 60)
+
+
+def test_gyro_is_averaged_over_each_step_and_turned_upright(drive: Drive, aruco: Path) -> None:
+    log = imported(aruco, imu="/imu")
+    assert drive.log.truth is not None and log.odometry.gyro_radps is not None
+    turn_rad = np.remainder(np.diff(drive.log.truth.theta_rad[:601]) + np.pi, 2 * np.pi) - np.pi
+    np.testing.assert_allclose(log.odometry.gyro_radps, turn_rad / 0.04, atol=1e-9)
+    assert log.robot.gyro_sigma_radps == pytest.approx(1e-3 / 2.0)  # of four readings a step
+
+
+def test_joints_make_the_same_travel(drive: Drive, tags: Path) -> None:
+    request = {"joints": "/joint_states", "wheel_radius_m": 0.05, "rectified": False, "sizes": SIZES}
+    log = imported(tags, **request)
+    np.testing.assert_allclose(log.odometry.a, drive.log.odometry.a, atol=1e-9)
+    np.testing.assert_allclose(log.odometry.b, drive.log.odometry.b, atol=1e-9)
+
+
+def test_corners_give_bearing_range_and_their_noise(drive: Drive, tags: Path) -> None:
+    log = imported(tags, rectified=False, sizes=SIZES, truth="/mocap")
+    sightings, truth, beacons = log.sightings, log.truth, drive.log.beacons
+    assert truth is not None and beacons is not None
+    assert sightings.bearing_sd_rad is not None and sightings.range_sd_m is not None
+    assert len(sightings.time_us) > 400
+    row = np.searchsorted(truth.time_us, sightings.time_us)
+    theta, robot = truth.theta_rad[row], drive.log.robot
+    at = np.argsort(beacons.beacon_id)[sightings.beacon_id]
+    x_m = truth.x_m[row] + robot.sensor_x_m * np.cos(theta) - robot.sensor_y_m * np.sin(theta)
+    y_m = truth.y_m[row] + robot.sensor_x_m * np.sin(theta) + robot.sensor_y_m * np.cos(theta)
+    dx_m, dy_m = beacons.x_m[at] - x_m, beacons.y_m[at] - y_m
+    off_rad = np.arctan2(dy_m, dx_m) - theta - robot.sensor_yaw_rad - sightings.bearing_rad
+    off_rad = np.remainder(off_rad + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(off_rad).max() < 0.005
+    off = (sightings.range_m - np.hypot(dx_m, dy_m)) / sightings.range_sd_m
+    # Corners err by 0.2 px where 0.5 are told.
+    assert 0.1 < np.sqrt(np.mean(off**2)) < 0.8
+    assert np.abs(np.mean(off)) < 0.15
+    assert log.robot.field_of_view_rad == pytest.approx(2 * math.atan(640 / CAMERA.fx), rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def direct_error_m(drive: Drive) -> float:
+    return replayed_error_m(drive.log)
+
+
+def replayed_error_m(log: Log) -> float:
+    trace = run_log(log, OPTIONS)
+    summary = summarise(log, trace, OPTIONS, evaluate(log, trace, OPTIONS))
+    assert not summary["diverged"]
+    return summary["position_error_m"]["mean"]
+
+
+NOISE = [
+    f"--set={name}"
+    for name in ("bearing_sigma_rad=0.013575", "range_sigma_fraction=0.02", "range_sigma_scale_m=110.9")
+]
+
+
+def test_command_line_from_bag_to_map_with_the_error_of_the_direct_log(
+    tmp_path: Path, aruco: Path, direct_error_m: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "drive"
+    words = ["import", "ros2", str(aruco), "--odometry", "/odom", "--detections", "/aruco_markers"]
+    more = ["--truth", "/mocap", "--wheelbase", "0.4", *NOISE, "--set", "range_sigma_floor_m=0.0"]
+    assert main([*words, *more, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "/odom (nav_msgs/msg/Odometry): 601 messages in 24.0 s, 25.0 Hz" in said
+    assert "of 6 beacons: 0, 1, 2, 3, 4, 5" in said
+    assert "guessed: wheel_speed_sigma_mps = 0.05" in said
+    assert "guessed: bearing_sigma_rad" not in said
+    assert main(["check", str(out), "--out", str(tmp_path / "check")]) == 0
+    replay = ["replay", "csv", str(out), "--association", "known", "--jobs", "1", "--pictures", "0"]
+    assert main([*replay, "--out", str(tmp_path / "out")]) == 0
+    (run,) = json.loads((tmp_path / "out" / "summary.json").read_text())["runs"]
+    assert run["position_error_m"]["mean"] == pytest.approx(direct_error_m, abs=1e-4)
+
+
+def test_tags_are_replayed_about_as_well_as_the_direct_log(
+    tmp_path: Path, tags: Path, direct_error_m: float
+) -> None:
+    sizes = tmp_path / "tags.toml"
+    sizes.write_text('default_m = 0.3\n[side_m]\n"tag36h11:1" = 0.3\n2 = 0.3\n')
+    out = tmp_path / "drive"
+    words = ["import", "ros2", str(tags), "--tags", str(sizes), "--image", "raw", "--wheelbase", "0.4"]
+    assert main([*words, "--truth", "/mocap", "--out", str(out)]) == 0
+    log = read_folder(out)
+    assert not [one for one in check_log(log).findings if not one.is_note]
+    # Fewer beacons are in the camera's image than in the simulated sensor's; what is seen is seen better.
+    assert replayed_error_m(log) < 2.0 * direct_error_m
+
+
+def test_a_folder_that_is_there_keeps_what_is_no_log(tmp_path: Path, aruco: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "beacons.csv").write_text("of another drive")
+    assert main(["import", "ros2", str(aruco), "--out", str(tmp_path)]) == 0
+    assert sorted(one.name for one in tmp_path.iterdir()) == [
+        "notes.txt", "odometry.csv", "robot.toml", "sightings.csv",
+    ]  # fmt: skip
+    read_folder(tmp_path)
+
+
+# --- bad input ----------------------------------------------------------------------------------------------
+
+BAD = {
+    "{tags} --tag-size 0.3": "the camera distorts; allowed: --image rectified",
+    "{tags} --image raw": "size of tags tag36h11:0, tag36h11:1",
+    "{tags} --image raw --tag-size 300": "--tag-size: 300.0 is not allowed",
+    "{tags} --odometry /odm": "no topic /odm (--odometry), did you mean /odom?",
+    "{tags} --detections /odom": "topic /odom (--detections) is of type nav_msgs/msg/Odometry; allowed: ap",
+    "{tags} --joints /joint_states --image raw --tag-size 0.3": "--wheel-radius METRES, which is missing",
+    "{tags} --joints /joint_states --left-joint l --wheel-radius 0.1 --wheelbase 0.3": "--left-joint",
+    "{aruco} --tag-size 0.3": "sizes of tags have no use",
+    "{aruco} --base nowhere": "no way from nowhere to camera_optical_frame",
+    "{aruco} --mount 1,2": "allowed: X_M,Y_M,YAW_RAD",
+    "{aruco} --truth /tf_static": "--truth /tf_static:CHILD_FRAME",
+    "{aruco} --set wheelbas_m=0.3": "--set, key wheelbas_m: no such key",
+    "{aruco} --set wheelbase_m": "allowed: KEY=VALUE",
+    "{aruco} --wheelbase 300": "--wheelbase: 300.0 is not allowed",
+    "{tmp}/none": "no such bag",
+    "{tmp}": "no metadata.yaml in it",
+    "{tmp}/old.bag": "rosbags-convert",
+}
+
+
+@pytest.mark.parametrize(("words", "said"), BAD.items())
+def test_bad_requests_are_one_line(
+    tmp_path: Path, aruco: Path, tags: Path, capsys: pytest.CaptureFixture[str], words: str, said: str
+) -> None:
+    assert_refused(tmp_path, words.format(aruco=aruco, tags=tags, tmp=tmp_path), said, capsys)
+
+
+def assert_refused(tmp_path: Path, words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["import", "ros2", *words.split(), "--out", str(tmp_path / "log")]) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.count("\n") == 1
+    assert said in told.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
+    start = replace(drive, log=_beginning(drive.log))
+    odometry, aruco, static = list(start.odometry()), list(start.aruco()), list(start.static())
+    thing = [(EPOCH_NS, "/thing", MADE_UP, new(MADE_UP, header=header(EPOCH_NS)))]
+    yield "no markers", [*odometry, *static], "no topic of markers"
+    yield "no odometry", [*aruco, *static, *thing], "no topic of type nav_msgs/msg/Odometry"
+    yield "no mount", [*odometry, *aruco], "/tf_static has no way from base_link to camera_optical_frame"
+    yield "no camera", [*odometry, *start.apriltags(), *static], "no sensor_msgs/msg/CameraInfo is there"
+    yield (
+        "two odometries",
+        [*odometry, *[(t, "/odom2", k, m) for t, _, k, m in odometry], *aruco],
+        "several topics fit",
+    )
+    yield "one message", [odometry[0], *aruco, *static], "1 messages; allowed: two or more"
+    yield (
+        "no stamps",
+        [*(_unstamped(one) for one in start.odometry()), *aruco, *static],
+        "header.stamp of message 0 is 0",
+    )
+    later = Drive(start.log)
+    later.time_ns = lambda time_us: EPOCH_NS + 10**12 + int(time_us) * 1000  # type: ignore[method-assign]
+    yield "other clock", [*odometry, *later.aruco(), *static], "allowed: stamps of one clock"
+    yield (
+        "anew",
+        [*odometry, *((t + 10**12, n, k, m) for t, n, k, m in odometry), *aruco, *static],
+        "runs back by 2.400 s",
+    )
+    empty = "ros2_aruco_interfaces/msg/ArucoMarkers"
+    none = [(EPOCH_NS, "/aruco_markers", empty, new(empty, header=header(EPOCH_NS)))]
+    yield "never a marker", [*odometry, *none, *static], "hold no marker"
+
+
+def _unstamped(said: Said) -> Said:
+    said[3].header.stamp.sec, said[3].header.stamp.nanosec = 0, 0
+    return said
+
+
+def test_bags_that_lack_something_are_one_line(
+    tmp_path: Path, drive: Drive, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, said, why in _broken(drive):
+        bag = write_bag(tmp_path / name.replace(" ", "_"), said)
+        assert_refused(tmp_path, str(bag), why, capsys)
+
+
+def test_a_type_that_nobody_defines_is_named(
+    tmp_path: Path, drive: Drive, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(
+        __import__("bslam.ros2.bag").ros2.bag.DEFINITIONS, "ros2_aruco_interfaces/msg/ArucoMarkers"
+    )
+    start = replace(drive, log=_beginning(drive.log))
+    bag = write_bag(tmp_path / "bag", parts(start.odometry(), start.aruco()), "sqlite3", definitions=False)
+    assert_refused(tmp_path, str(bag), "which the bag does not define", capsys)
+
+
+@pytest.mark.parametrize("plugin", ["mcap", "sqlite3"])
+def test_damaged_bags_are_one_line(
+    tmp_path: Path, drive: Drive, plugin: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start = replace(drive, log=_beginning(drive.log))
+    bag = write_bag(tmp_path / "bag", parts(start.odometry(), start.aruco(), start.static()), plugin)
+    (file,) = (one for one in bag.iterdir() if one.suffix != ".yaml")
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    assert_refused(tmp_path, str(bag), "damaged, or no bag of ROS 2", capsys)
+    file.write_bytes(b"")
+    assert_refused(tmp_path, str(file), "damaged, or no bag of ROS 2", capsys)
+
+
+def test_a_recording_of_bslam_is_no_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from mcap.writer import Writer as McapWriter
+
+    with (tmp_path / "drive.mcap").open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="")
+        writer.finish()
+    assert_refused(tmp_path, str(tmp_path / "drive.mcap"), "bslam export FILE --format csv", capsys)
+
+
+def test_without_rosbags_the_line_says_how_to_get_it(
+    tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "rosbags.rosbag2", None)
+    assert_refused(tmp_path, str(aruco), "pip install rosbags", capsys)
+
+
+def test_out_may_not_be_a_file(tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "log").write_text("")
+    assert_refused(tmp_path, str(aruco), "there is a file of that name", capsys)
+
+
+def test_definitions_here_are_those_of_the_messages() -> None:
+    for kind in ("apriltag_msgs/msg/AprilTagDetectionArray", "vision_msgs/msg/Detection3DArray"):
+        assert STORE.deserialize_cdr(STORE.serialize_cdr(new(kind), kind), kind) is not None
