@@ -75,7 +75,6 @@ OPTIONS = LOG | {"core", "datasets", "options"}
 EVALUATION = OPTIONS | {"evaluation"}
 RUNS = EVALUATION | {
     "algorithms",
-    "datasets",
     "maps",
     "moment",
     "recording",
@@ -103,6 +102,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "target": frozenset({"errors", "core", "link"}),
     "recording": LOG | {"core"},
     "datasets": LOG | {"modelfile", "rig"},
+    "ros2": LOG,
     "options": OPTIONS,
     "evaluation": EVALUATION,
     "calibration": EVALUATION | {"rig", "world"},
