@@ -36,6 +36,7 @@ from bslam.runs.player import Player
 from bslam.runs.rerun import options_of
 from bslam.runs.runner import Watcher
 from bslam.runs.sources import CameraSource, RecordingSource, Source
+from bslam.view.rerun_view import Scene, follow, open_stream
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "watch the filter at work in the browser: pause it, step it, see why each sighting was taken"
@@ -48,6 +49,7 @@ EXAMPLES = """examples:
   bslam live csv out/run/paper_room_seed0
   bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
   bslam live paper_room --target qemu:mps2_an386
+  bslam live csv my_drive --rerun        (pip install rerun-sdk)
   ssh -L 5006:127.0.0.1:5006 HOST bslam live paper_room     then open http://127.0.0.1:5006/ here
 
 The page is served to this machine alone, and needs no network. A run that comes to its end leaves in --out
@@ -78,6 +80,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIMES",
         help="so many times as fast as the robot drives, or inf: as fast as it goes (default: 1)",
     )
+    group.add_argument(
+        "--rerun",
+        nargs="?",
+        const="viewer",
+        metavar="FILE.rrd",
+        help="in Rerun's viewer, or into a file for it, in place of the page",
+    )
     group.add_argument("--paused", action="store_true", help="wait at the start for Play or Step")
     group = parser.add_argument_group("run")
     group.add_argument("--seed", type=whole_number, default=0, metavar="N", help="default: 0")
@@ -92,6 +101,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
+    if arguments.rerun is not None:
+        return _follow_in_rerun(arguments)
     from bslam.view.live import Page  # here: it takes a second, which no other command need wait
     from bslam.view.serve import has_screen, serve
 
@@ -117,6 +128,22 @@ def execute(arguments: argparse.Namespace) -> int:
         pass
     finally:
         show.player.stop()
+    return show.end()
+
+
+def _follow_in_rerun(arguments: argparse.Namespace) -> int:
+    """The same run, followed by Rerun's viewer; it has no buttons for the run."""
+    stream = open_stream(arguments.rerun)
+    show = _Show(_job(arguments), arguments.out.absolute(), arguments.speed)
+    show.player.start()
+    show.player.pace.play()
+    try:
+        follow(Scene(show.stage, stream), lambda: show.player.moment)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        show.player.stop()
+        stream.disconnect()
     return show.end()
 
 
