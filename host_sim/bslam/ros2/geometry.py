@@ -20,7 +20,7 @@ DISTORTIONS: Final = ("", "plumb_bob", "rational_polynomial")
 _UNDISTORT_STEPS, _UNDISTORT_WITHIN = 50, 1e-4
 _CHI2_95: Final = 5.991  # two degrees of freedom
 _FIT_STEPS: Final = 40
-_FIT_WITHIN: Final = 1e-6  # of its sd: a step so small is the last
+_FIT_WITHIN: Final = 1e-4  # of its sd: a step so small is the last
 _TILT_SD_RAD: Final = 1.0  # what is known of a tag's tilt before it is seen: holds those seen from the front
 # From the top left, clockwise in the image; any other order round the tag gives its centre too.
 _SQUARE: Final = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -158,7 +158,9 @@ class Camera:
         with np.errstate(all="ignore"):
             for _ in range(_UNDISTORT_STEPS):
                 radial, shift = self._distortion_at(rays)
-                rays = (seen - shift) / radial
+                rays, before = (seen - shift) / radial, rays
+                if np.allclose(rays, before, rtol=0.0, atol=1e-12):
+                    break
             radial, shift = self._distortion_at(rays)
             off = np.abs(rays * radial + shift - seen).max(axis=1)
         rays[~(off < _UNDISTORT_WITHIN)] = np.nan
@@ -207,6 +209,8 @@ def place_tags(rays: Floats, side_m: Floats, ray_sd: float) -> tuple[Floats, Flo
             damping[todo] *= np.where(better, 0.1, 10.0)
             gain = np.einsum("ni,nij,nj->n", step, now, step)
             todo = todo[~(gain < _FIT_WITHIN**2)]
+            if not len(todo):
+                break
     good = np.isfinite(information).all(axis=(1, 2)) & (place[:, 2] > 0.0)
     place[~good], information[~good] = np.nan, np.eye(6)
     return place, np.linalg.inv(information)[:, 3:, 3:]
