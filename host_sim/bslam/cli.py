@@ -34,7 +34,8 @@ from bslam.commands import (
     sweep,
     tables,
 )
-from bslam.errors import BslamError
+from bslam.commands.parser import Parser
+from bslam.errors import BslamError, did_you_mean
 
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
@@ -71,10 +72,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name, *rest = words
     try:
         if name not in COMMANDS:
-            raise BslamError(f"command '{name}' does not exist; allowed: {', '.join(COMMANDS)}")
+            allowed = f"allowed: {', '.join(COMMANDS)}{did_you_mean(name, COMMANDS)}"
+            raise BslamError(f"command '{name}' does not exist; {allowed}")
         command = COMMANDS[name]
         # Not argparse's own sub-parsers: with them options could not stand between two directories.
-        status = int(command.execute(_parser(name, command).parse_intermixed_args(rest)))
+        status = int(command.execute(_parser(name, command).words(rest)))
         sys.stdout.flush()
         return status
     except BslamError as error:
@@ -89,8 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-def _parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser(name: str, command: ModuleType) -> Parser:
+    parser = Parser(
         prog=f"bslam {name}",
         description=command.SUMMARY,
         epilog=command.EXAMPLES,

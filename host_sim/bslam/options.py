@@ -216,7 +216,7 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
     for name, value in log.robot.settings:
         if name not in preset:
-            allowed = f"allowed: {', '.join(preset)}"
+            allowed = f"allowed: {', '.join(preset)}{did_you_mean(name, preset)}"
             raise BslamError(f"{log.name}: robot.toml, [settings], key {name}: no such setting; {allowed}")
         params[name] = value
     return params | _recovery_params(recovery_of(options)) | dict(options.parameters)

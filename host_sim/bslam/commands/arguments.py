@@ -13,7 +13,7 @@ import joblib
 
 from bslam.core.presets import PRESETS
 from bslam.core.slam import Slam
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 from bslam.maps.blob import SUFFIX
 from bslam.options import (
@@ -31,7 +31,7 @@ from bslam.options import (
 )
 from bslam.runs.camera import SCANNER_THRESHOLD, TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.runs.sources import CameraSource, Says, ScenarioSource, options_for
-from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
+from bslam.target.lines import TARGET_KINDS, no_such_target, qemu_machines
 from bslam.world.scenario import load_scenario
 
 T = TypeVar("T")
@@ -328,10 +328,16 @@ def _read_params(path: Path) -> dict[str, Number]:
 
 
 def _checked(values: dict[str, Number], where: str) -> dict[str, Number]:
-    defaults = Slam.defaults()
-    for key in values:
-        if key not in defaults:
-            raise BslamError(f"{where}: parameter '{key}' does not exist; allowed: {', '.join(defaults)}")
+    table = {one.name: one for one in Slam.parameters()}
+    for key, value in values.items():
+        if key not in table:
+            allowed = f"allowed: {', '.join(table)}{did_you_mean(key, table)}"
+            raise BslamError(f"{where}: parameter '{key}' does not exist; {allowed}")
+        one = table[key]
+        if not one.low <= value <= one.high or (one.is_integer and value != int(value)):
+            kind = "a whole number" if one.is_integer else "a number"
+            allowed = f"allowed: {kind} from {one.low:g} to {one.high:g}"
+            raise BslamError(f"{where}: parameter {key} = {value}; {allowed}")
     return values
 
 
@@ -358,7 +364,8 @@ def _word(allowed: Iterable[str]) -> Callable[[str], str]:
 
     def parse(text: str) -> str:
         if text not in names:
-            raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {', '.join(names)}")
+            allowed = f"allowed: {', '.join(names)}{did_you_mean(text, names)}"
+            raise argparse.ArgumentTypeError(f"'{text}' does not exist; {allowed}")
         return text
 
     return parse
@@ -375,7 +382,7 @@ def _target(text: str) -> str:
     kind, _, name = text.partition(":")
     there = kind in TARGET_KINDS and name and (kind != "qemu" or name in qemu_machines())
     if text != "host" and not there:
-        raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {allowed_targets()}")
+        raise argparse.ArgumentTypeError(no_such_target(text))
     return text
 
 

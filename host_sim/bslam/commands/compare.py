@@ -21,7 +21,7 @@ from bslam.commands.arguments import (
     scenario_source,
 )
 from bslam.commands.report import table_of
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 from bslam.options import RunOptions
 from bslam.runs.contest import ContestResult, hold_contest, make_bouts, means
 from bslam.runs.methods import BOUND, Method, own_method, shipped_methods
@@ -126,7 +126,8 @@ def _named(shipped: Sequence[Method], only: str) -> list[Method]:
     chosen = []
     for name in (word.strip() for word in only.split(",")):
         if name not in by_name:
-            raise BslamError(f"--only {name}: there is no such algorithm; allowed: {', '.join(by_name)}")
+            allowed = f"allowed: {', '.join(by_name)}{did_you_mean(name, by_name)}"
+            raise BslamError(f"--only {name}: there is no such algorithm; {allowed}")
         if not by_name[name].is_here:
             raise BslamError(f"--only {name}: is not installed; allowed: {by_name[name].install}")
         chosen.append(by_name[name])

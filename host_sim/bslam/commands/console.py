@@ -26,7 +26,7 @@ from bslam.recording.recorder import MAP_PERIOD_US
 from bslam.runs.kept import read_blob
 from bslam.runs.runner import run_log
 from bslam.runs.sources import what_it_says
-from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
+from bslam.target.lines import TARGET_KINDS, TargetError, no_such_target, open_line
 from bslam.target.remote import RemoteSlam, Told
 from bslam.world.simulate import load_scenario, simulate
 
@@ -364,5 +364,5 @@ def _pose(text: str) -> tuple[float, ...]:
 def _target(text: str) -> str:
     kind, _, name = text.partition(":")
     if kind not in TARGET_KINDS or not name:
-        raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {allowed_targets()}")
+        raise argparse.ArgumentTypeError(no_such_target(text))
     return text

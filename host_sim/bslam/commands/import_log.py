@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bslam.errors import BslamError
-from bslam.log import WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot, write_folder
+from bslam.log import WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot
 from bslam.parsing.settings import number, parse_table
 from bslam.ros2.importer import Request, import_bag
 from bslam.ros2.tags import HELP, SIDE_M, TagSizes, read_tag_sizes
@@ -146,7 +146,7 @@ def _write(log: Log, out: Path) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
         try:
-            write_folder(log, made)
+            log.write(made)
             made.chmod(0o755)  # mkdtemp makes it private
             if not out.exists():
                 made.rename(out)

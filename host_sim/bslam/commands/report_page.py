@@ -19,6 +19,7 @@ import joblib
 from bslam.commands import compare, replay, run, sweep, tables
 from bslam.commands.arguments import positive_count, seeds_range, whole_number
 from bslam.datasets.datasets import VARIABLE, data_root
+from bslam.errors import did_you_mean
 from bslam.evaluation.consistency import half_interval_95
 from bslam.runs.batch import BatchResult, Job, run_batch
 from bslam.runs.output import write_atomically
@@ -351,7 +352,8 @@ def _parts(text: str) -> list[str]:
     names = [word.strip() for word in text.split(",")]
     for name in names:
         if name not in _PARTS:
-            raise argparse.ArgumentTypeError(f"'{name}' is no part; allowed: {', '.join(_PARTS)}")
+            allowed = f"allowed: {', '.join(_PARTS)}{did_you_mean(name, _PARTS)}"
+            raise argparse.ArgumentTypeError(f"'{name}' is no part; {allowed}")
     return names
 
 

@@ -14,6 +14,7 @@ from bslam.commands.arguments import add_batch_options, add_filter_options, run_
 from bslam.commands.drawing import draw
 from bslam.commands.report import table_of
 from bslam.commands.sweep import add_files_option, add_restart_option, finish, make_runs
+from bslam.errors import did_you_mean
 from bslam.options import RunOptions
 from bslam.runs.batch import Job, make_jobs
 from bslam.runs.output import write_atomically
@@ -176,5 +177,6 @@ def _rows(text: str) -> list[str]:
     names = text.split(",")
     for name in names:
         if name not in ROWS:
-            raise argparse.ArgumentTypeError(f"'{name}' does not exist; allowed: {', '.join(ROWS)}")
+            allowed = f"allowed: {', '.join(ROWS)}{did_you_mean(name, ROWS)}"
+            raise argparse.ArgumentTypeError(f"'{name}' does not exist; {allowed}")
     return [name for name in ROWS if name in names]

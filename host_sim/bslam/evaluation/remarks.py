@@ -30,7 +30,8 @@ def notes_on(log: Log, trace: Trace, options: RunOptions) -> list[str]:
         notes.append(f"{refused} of {_inputs(log)} inputs refused: {by_status}")
     counts = trace.counts
     if counts.rejected > _MANY * counts.sightings:
-        notes.append(f"{counts.rejected} of {counts.sightings} sightings gated")
+        why = "; `bslam check` tells a log's slips" if options.sensor == "recorded" else ""
+        notes.append(f"{counts.rejected} of {counts.sightings} sightings gated{why}")
     return notes
 
 

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Protocol
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 ROOT = Path(__file__).resolve().parents[3]
 BUILD_DIR = ROOT / "build"
@@ -122,14 +122,17 @@ def open_line(target: str) -> Line:
         return SerialLine(name)
     if kind == "process":
         return ProcessLine(Path(name))
-    raise BslamError(f"target '{target}' does not exist; allowed: {allowed_targets()}")
+    raise BslamError(f"target {no_such_target(target)}")
 
 
-def allowed_targets() -> str:
-    """In the words of an error. qemu:BOARD:FILM, too, with a film that the robot drives by."""
-    boards = ", ".join(f"qemu:{board}" for board in qemu_machines())
-    here = boards or "qemu:BOARD (in a clone of bslam, where `make firmware` builds its image)"
-    return f"host, {here}, serial:DEVICE, process:PROGRAM"
+def no_such_target(target: str) -> str:
+    """What an error says of one. qemu:BOARD:FILM is allowed, too, with a film that the robot drives by."""
+    boards = [f"qemu:{board}" for board in qemu_machines()]
+    here = boards or ["qemu:BOARD (in a clone of bslam, where `make firmware` builds its image)"]
+    names = ["host", *here]
+    is_port = re.fullmatch(r"/dev/.+|tty\w+|COM\d+", target, re.IGNORECASE) is not None
+    near = f"; did you mean 'serial:{target}'?" if is_port else did_you_mean(target, names)
+    return f"'{target}' does not exist; allowed: {', '.join(names)}, serial:DEVICE, process:PROGRAM{near}"
 
 
 class QemuLine:
@@ -144,7 +147,7 @@ class QemuLine:
         board, _, program = image.partition("/")
         machines = qemu_machines()
         if board not in machines:
-            raise BslamError(f"target 'qemu:{board}' does not exist; allowed: {allowed_targets()}")
+            raise BslamError(f"target {no_such_target(f'qemu:{board}')}")
         self._emulator, self._start_words = emulator_of(board), how_to_start(board)
         if shutil.which(self._emulator) is None:
             package = "qemu-system-arm" if self._emulator == QEMU else "qemu-system-misc"

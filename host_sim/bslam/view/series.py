@@ -31,7 +31,8 @@ class Series:
 def draw_run(series: Series) -> Figure:
     """Error and NEES, one above the other."""
     figure = new_figure(9.5, 6.0)
-    draw_run_in(*figure.subplots(2, 1, sharex=True), series)
+    error_axes, nees_axes = figure.subplots(2, 1, sharex=True)
+    draw_run_in(error_axes, nees_axes, series)
     return figure
 
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.log import read_folder, write_folder
+from bslam.log import Log
 from bslam.logcheck.check import check_folder
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
@@ -49,7 +49,7 @@ def texts_of(folder: Path) -> dict[str, str]:
 
 
 def folder_of(log, path: Path) -> Path:
-    write_folder(log, path)
+    log.write(path)
     return path
 
 
@@ -205,7 +205,7 @@ def test_playground_a_dropped_log_ends_where_replay_does(playground, tmp_path, k
     folder = folder_of(made_up(kind=kind), tmp_path / "drive")
     playground.evaluate(DROP, texts_of(folder))
     expect(playground.locator("#title")).to_have_text("log: 0 findings")
-    trace = run_log(read_folder(folder), RunOptions(sensor="recorded"))
+    trace = run_log(Log.read(folder), RunOptions(sensor="recorded"))
     poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
     assert np.array_equal(np.array(poses), trace.pose)
     beacons = playground.evaluate("page.shown.result.beacons.map(one => [one.x, one.y])")
@@ -223,7 +223,7 @@ def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
     playground.locator("#association").select_option("joint")
     expect(playground.locator("#message")).to_be_hidden()
     options = RunOptions(sensor="recorded", filter="standard", association="joint")
-    last = run_log(read_folder(folder), options).pose[-1]
+    last = run_log(Log.read(folder), options).pose[-1]
     playground.wait_for_timeout(300)
     poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
     assert poses[-1] == last.tolist()
