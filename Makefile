@@ -19,6 +19,7 @@ include mk/lint.mk
 include mk/bench.mk
 include mk/docs.mk
 include mk/playground.mk
+include mk/site.mk
 include mk/fuzz.mk
 include mk/mcdc.mk
 include mk/soak.mk

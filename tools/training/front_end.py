@@ -142,12 +142,6 @@ class FrontEnd(vision.FrontEnd):
         shape = (thumbnail.height_px // 4, thumbnail.width_px // 4)
         return self._library.copy_of(thumbnail.notes.values, shape[0] * shape[1], np.int8).reshape(shape)
 
-    def floor_distances(self) -> NDArray[np.float32]:
-        """Distance of the floor line in each column of cells, m; 0: not known."""
-        inside = self._inside()
-        columns = inside.thumbnail.width_px // 4
-        return self._library.copy_of(inside.floor_line.distance_m, columns, np.float32)
-
 
 def feature_counts() -> tuple[int, int, int, int]:
     """Features of a cell, of a glance at a proposal, of a proposal, and of a closer look at it."""

@@ -1,0 +1,18 @@
+# The site: one folder of files for any web server, or to open from the disk. It asks nobody else for anything.
+
+SITE_VENV := build/site/venv
+SITE_STAMP := $(SITE_VENV)/stamp
+SITE_PAGES := build/site/docs
+PLAYGROUND_HTML := out/playground/index.html
+
+.PHONY: site
+site: $(SITE_STAMP) $(if $(wildcard mk/playground.mk),playground) ## the site in out/site: documents, headers, notebooks, pictures, playground
+	@$(SITE_VENV)/bin/python -m tools.site_pages $(SITE_PAGES)
+	@test ! -f $(PLAYGROUND_HTML) || install -D $(PLAYGROUND_HTML) $(SITE_PAGES)/playground/index.html
+	@NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs --quiet build --strict
+	@echo "site: open out/site/index.html"
+
+$(SITE_STAMP): requirements-site.txt
+	@python3 -m venv $(SITE_VENV)
+	@$(SITE_VENV)/bin/pip install --quiet --requirement requirements-site.txt
+	@touch $@
