@@ -12,6 +12,9 @@ PLAYGROUND_COMPILE := clang-19 --target=wasm32 $(C_STANDARD) -Os -mbulk-memory -
 PLAYGROUND_C := playground/playground.c playground/libc/libc.c $(LIBRARY_SOURCES_bslam)
 PLAYGROUND_PAGE := $(sort $(wildcard playground/page.html playground/*.css playground/*.js playground/*/*.js))
 
+C_FILES += $(wildcard playground/*.c playground/libc/*.[ch])
+PYTHON_DIRS += playground
+
 .PHONY: playground
 playground: out/playground/index.html ## the estimator in a browser tab: out/playground/index.html, one file
 	@echo "$<: $$(wc -c < $<) bytes"

@@ -22,8 +22,14 @@ function errorInvariant(estimate, truth) {
 /** Covariance of that error, as xx, yx, yy, tx, ty, tt, from the covariance of the plain difference. */
 function covarianceInvariant(estimate, [xx, yx, yy, tx, ty, tt]) {
     const { x, y } = estimate;
-    return [xx + 2 * y * tx + y * y * tt, yx - x * tx + y * ty - x * y * tt, yy - 2 * x * ty + x * x * tt,
-        tx + y * tt, ty - x * tt, tt];
+    return [
+        xx + 2 * y * tx + y * y * tt,
+        yx - x * tx + y * ty - x * y * tt,
+        yy - 2 * x * ty + x * x * tt,
+        tx + y * tt,
+        ty - x * tt,
+        tt,
+    ];
 }
 
 /** Normalised estimation error squared of the pose: 3 on average if the covariance is right. */

@@ -6,14 +6,23 @@ const FILTERS = ["standard", "invariant", "smoother"];
 const ASSOCIATIONS = ["known", "nearest", "mahalanobis", "svm", "joint", "position"];
 const SOURCES = { wheels: 0, ticks: 1, velocity: 2 };
 const OUTCOMES = ["rejected", "matched", "new", "deferred"];
-const REASONS = ["none", "class", "no identity", "duplicate", "ambiguous", "appearance", "gate", "map full",
-    "singular", "frozen", "lost", "tentative"];
+const REASONS = [
+    "none",
+    "class",
+    "no identity",
+    "duplicate",
+    "ambiguous",
+    "appearance",
+    "gate",
+    "map full",
+    "singular",
+    "frozen",
+    "lost",
+    "tentative",
+];
 const RECOVERY_STATES = ["following", "doubting", "lost"];
 const NUMBERS_MAX = 16; // of playground.c
 const CLASS_NOT_MAPPABLE = 255;
-
-/** What the page says instead of doing what was asked: what, where, what is allowed. */
-class PageError extends Error {}
 
 function decodeBase64(text) {
     return Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
@@ -64,7 +73,7 @@ class Estimator {
         return Object.fromEntries(this.names.map((name, id) => [name, this.core.page_get(id)]));
     }
 
-    /** A robot at the origin of an empty map. Throws PageError for a setting that is none or out of range. */
+    /** A robot at the origin of an empty map. Throws PageError for a setting that is out of range. */
     begin(settings) {
         this.core.page_preset(0);
         for (const [name, value] of Object.entries(settings)) {
@@ -79,7 +88,7 @@ class Estimator {
     set(name, value) {
         const id = this.ids.get(name);
         if (id === undefined) {
-            throw new PageError(`setting ${name} does not exist; allowed: ${this.names.join(", ")}`);
+            throw new Error(`no setting ${name}`);
         }
         this.core.page_setting_limits(id);
         const [low, high, isWhole] = this.numbers(3);
@@ -106,8 +115,16 @@ class Estimator {
         this.inputs?.push(["frame", timeUs, sightings]);
         for (const one of sightings) {
             const beaconClass = one.mappable === false ? CLASS_NOT_MAPPABLE : one.beaconClass || 0;
-            const status = this.core.page_sighting(one.bearingRad, one.rangeM, one.label, beaconClass,
-                one.bearingSdRad || 0, one.rangeSdM || 0, one.rangeScaleSd || 0, one.score || 0);
+            const status = this.core.page_sighting(
+                one.bearingRad,
+                one.rangeM,
+                one.label,
+                beaconClass,
+                one.bearingSdRad || 0,
+                one.rangeSdM || 0,
+                one.rangeScaleSd || 0,
+                one.score || 0,
+            );
             if (!this.took(status)) {
                 this.core.page_frame(-1); // forgets what was given of it
                 return null;

@@ -2,8 +2,19 @@
 // The map on its canvas. A scene: bounds, path, truePath, odometryPath, beacons, trueBeacons, and perhaps
 // walls, pose, truePose, sightings.
 
-const COLOURS = ["paper", "ink", "quiet", "line", "truth", "estimate", "odometry", "right", "wrong", "new",
-    "rejected"];
+const COLOURS = [
+    "paper",
+    "ink",
+    "quiet",
+    "line",
+    "truth",
+    "estimate",
+    "odometry",
+    "right",
+    "wrong",
+    "new",
+    "rejected",
+];
 
 /** The colours of style.css, so that lines and legend agree. */
 function themeColours() {

@@ -81,6 +81,12 @@ class Drive {
         this.odometryPath.add(this.odometryPose);
     }
 
+    /** To another place, which odometry does not see. */
+    carryAway() {
+        this.world.carryAway();
+        this.truePath.add({ x: NaN, y: NaN }); // no line leads there
+    }
+
     look(timeUs) {
         const seen = this.world.look();
         const accounts = this.estimator.frame(timeUs, this.asTold(seen));

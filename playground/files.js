@@ -22,7 +22,11 @@ async function filesOfEntry(entry) {
     }
     const reader = entry.createReader();
     const found = [];
-    for (let some; (some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject))).length; ) {
+    for (
+        let some;
+        (some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject))).length;
+
+    ) {
         found.push(...some.filter((one) => one.isFile)); // of the log's folder itself
     }
     return (await Promise.all(found.map(filesOfEntry))).flat();
@@ -43,7 +47,9 @@ async function logTexts(files) {
     }
     if (Object.keys(texts).length === 0) {
         const names = files.map((file) => file.name).join(", ") || "nothing";
-        throw new PageError(`${names}: no file of a log; allowed: ${LOG_FILES.join(", ")}, each perhaps as .gz`);
+        throw new PageError(
+            `${names}: no file of a log; allowed: ${LOG_FILES.join(", ")}, each perhaps as .gz`,
+        );
     }
     return texts;
 }
@@ -53,11 +59,13 @@ async function textOf(file) {
         throw new PageError(`${file.name}: it holds more than 256 MB of text; allowed: at most that`);
     }
     try {
-        const stream = file.name.endsWith(".gz") ? file.stream().pipeThrough(new DecompressionStream("gzip"))
+        const stream = file.name.endsWith(".gz")
+            ? file.stream().pipeThrough(new DecompressionStream("gzip"))
             : file.stream();
         return new TextDecoder("utf-8", { fatal: true }).decode(await new Response(stream).arrayBuffer());
     } catch (error) {
         throw new PageError(
-            `${file.name}: cannot be read: ${error.message}; allowed: UTF-8 text, gzipped if named .gz`);
+            `${file.name}: cannot be read: ${error.message}; allowed: UTF-8 text, gzipped if named .gz`,
+        );
     }
 }

@@ -1,4 +1,4 @@
-"""Puts the page's styles, scripts and the WebAssembly binary into one file, which a browser opens by itself."""
+"""Puts the page's styles, scripts and the WebAssembly binary into one file that a browser opens by itself."""
 
 import base64
 import re

@@ -35,8 +35,12 @@ async function loadFiles(name, files) {
 
 async function runLog(checked, choices) {
     await orSay(async () => {
+        const run = (page.newestRun = {});
         say(`${checked.log.name}: runs`);
         const replay = await new Replay(checked.log, { ...choices, recovery: false }).run();
+        if (run !== page.newestRun) {
+            return; // other choices were made meanwhile
+        }
         page.shown = { checked, replay, result: evaluate(replay) };
         page.roomChoices = page.roomChoices || readChoices();
         writeChoices(choices);
@@ -83,16 +87,23 @@ function logTitle({ log, findings }) {
 
 function showLog({ checked, replay, result }) {
     const { poses } = replay;
+    const lastTruth = result.truth[result.truth.length - 1];
     const path = thinned(poses);
     const truePath = thinned(result.truth);
     const odometryPath = thinned(deadReckoning(checked.log));
-    const trueBeacons = result.trueBeacons.map((one) => ({ ...one, name: identityText(checked.log, one.id) }));
+    const trueBeacons = result.trueBeacons.map((one) => ({
+        ...one,
+        name: identityText(checked.log, one.id),
+    }));
     new MapView(element("map"), {
         bounds: boundsOf([...path, ...truePath, ...trueBeacons, ...result.beacons]),
-        path, truePath, odometryPath, trueBeacons,
+        path,
+        truePath,
+        odometryPath,
+        trueBeacons,
         beacons: result.beacons.map((one) => ({ ...one, name: logName(checked.log, trueBeacons, one) })),
         pose: poses[poses.length - 1],
-        truePose: Number.isFinite(lastKnown(result.truth)?.theta) ? lastKnown(result.truth) : null,
+        truePose: Number.isFinite(lastTruth.theta) ? lastTruth : null,
     });
     drawPlots(element("plots"), thinned(result.errors));
     showFigures(logFigures(replay, result));
@@ -102,10 +113,6 @@ function showLog({ checked, replay, result }) {
 function thinned(rows) {
     const every = Math.ceil(rows.length / PLOT_ROWS_MAX) || 1;
     return rows.filter((_, row) => row % every === 0);
-}
-
-function lastKnown(poses) {
-    return poses[poses.length - 1];
 }
 
 /** Of a mapped beacon, unless its true one bears the name already. */
@@ -125,25 +132,40 @@ function boundsOf(places) {
         bounds.top = Math.max(bounds.top, y);
     }
     const margin = 0.5 + 0.03 * Math.max(bounds.right - bounds.left, bounds.top - bounds.bottom);
-    return { left: bounds.left - margin, right: bounds.right + margin, bottom: bounds.bottom - margin,
-        top: bounds.top + margin };
+    return {
+        left: bounds.left - margin,
+        right: bounds.right + margin,
+        bottom: bounds.bottom - margin,
+        top: bounds.top + margin,
+    };
 }
 
 function logFigures(replay, result) {
     const last = replay.poses[replay.poses.length - 1];
     const counts = replay.ledger.counts;
     const known = result.errors.map((row) => row[1]).filter(Number.isFinite);
-    const refused = Object.entries(replay.refusals).map(([name, count]) => `${count} ${name}`).join(", ");
+    const refused = Object.entries(replay.refusals)
+        .map(([name, count]) => `${count} ${name}`)
+        .join(", ");
     const figures = [
         ["time", `${lastOf(result.errors, 0).toFixed(1)} s`],
-        ["last pose x, y, heading", `${last.x.toFixed(2)}, ${last.y.toFixed(2)} m, ${last.theta.toFixed(2)} rad`],
-        ["beacons in the map", String(result.beacons.filter((one) => one.confirmed).length)],
-        ["sightings matched, new, not used", `${counts.right + counts.wrong}, ${counts.new}, ${counts.rejected}`],
+        [
+            "last pose x, y, heading",
+            `${last.x.toFixed(2)}, ${last.y.toFixed(2)} m, ${last.theta.toFixed(2)} rad`,
+        ],
+        ["beacons in the map (room for 80)", String(result.beacons.filter((one) => one.confirmed).length)],
+        [
+            "sightings matched, new, not used",
+            `${counts.right + counts.wrong}, ${counts.new}, ${counts.rejected}`,
+        ],
         ["inputs refused", refused || "none"],
     ];
     if (known.length) {
         const largest = known.reduce((most, one) => Math.max(most, one), 0);
-        figures.push(["error mean, largest", `${centimetres(meanOf(result.errors, 1))}, ${centimetres(largest)}`]);
+        figures.push([
+            "error mean, largest",
+            `${centimetres(meanOf(result.errors, 1))}, ${centimetres(largest)}`,
+        ]);
     }
     if (result.errors.some((row) => Number.isFinite(row[2]))) {
         figures.push(["mean NEES (3 is right)", meanOf(result.errors, 2).toFixed(1)]);
@@ -158,11 +180,15 @@ function logFigures(replay, result) {
 }
 
 function showFindings({ log, findings, untested }) {
-    const lines = findings.map(({ kind, what, sure, mend }) => (
-        paragraph(`${kind}: ${what}`, `sure: ${sure}`, `mend: ${mend}`)));
+    const lines = findings.map(({ kind, what, sure, mend }) =>
+        paragraph(`${kind}: ${what}`, `sure: ${sure}`, `mend: ${mend}`),
+    );
     lines.push(...log.notes.map((note) => paragraph(`note: ${note}`)));
     lines.push(...untested.map((one) => paragraph("", `not tested: ${one}`)));
-    element("findings").replaceChildren(...(findings.length ? [] : [paragraph("nothing was found")]), ...lines);
+    element("findings").replaceChildren(
+        ...(findings.length ? [] : [paragraph("nothing was found")]),
+        ...lines,
+    );
 }
 
 function paragraph(text, ...quietLines) {

@@ -2,13 +2,18 @@
 // What the user does, and what the page shows.
 
 const KEYS = {
-    ArrowUp: [1, 0], KeyW: [1, 0],
-    ArrowDown: [-1, 0], KeyS: [-1, 0],
-    ArrowLeft: [0, 1], KeyA: [0, 1],
-    ArrowRight: [0, -1], KeyD: [0, -1],
+    ArrowUp: [1, 0],
+    KeyW: [1, 0],
+    ArrowDown: [-1, 0],
+    KeyS: [-1, 0],
+    ArrowLeft: [0, 1],
+    KeyA: [0, 1],
+    ArrowRight: [0, -1],
+    KeyD: [0, -1],
 };
 const STEPS_A_PICTURE = 60; // a slow machine drives slower than asked, and stays usable
 const PLOT_S = 60;
+const TAP_MS = 400;
 const FIRST_STEPS = 25; // so that there is a map at once
 const NUMBERS = ["wheelNoise", "beacons", "seed", "fieldOfView"];
 const WORDS = ["filter", "association", "observation"];
@@ -18,6 +23,7 @@ const page = {
     drive: null,
     shown: null, // a log in place of the room
     roomChoices: null, // to go back to
+    newestRun: null, // of a log
     isPlaying: true,
     held: new Set(),
     lastMs: 0,
@@ -55,7 +61,14 @@ function command() {
         return null;
     }
     const pairs = [...page.held].map((key) => KEYS[key]);
-    const sum = (place) => Math.max(-1, Math.min(1, pairs.reduce((total, pair) => total + pair[place], 0)));
+    const sum = (place) =>
+        Math.max(
+            -1,
+            Math.min(
+                1,
+                pairs.reduce((total, pair) => total + pair[place], 0),
+            ),
+        );
     return { forward: sum(0), turn: sum(1) };
 }
 
@@ -104,7 +117,10 @@ function showDrive(drive) {
         truePose: drive.world.pose,
     });
     const last = drive.errors.length ? drive.errors[drive.errors.length - 1][0] : 0;
-    drawPlots(element("plots"), drive.errors.filter((row) => row[0] > last - PLOT_S));
+    drawPlots(
+        element("plots"),
+        drive.errors.filter((row) => row[0] > last - PLOT_S),
+    );
     showFigures(driveFigures(drive));
     element("wheelNoiseText").textContent = `${drive.choices.wheelNoise.toFixed(2)} m/s`;
     element("beaconsText").textContent = String(drive.choices.beacons);
@@ -121,7 +137,10 @@ function driveFigures(drive) {
     return [
         ["time", `${(1e-6 * drive.world.timeUs).toFixed(1)} s`],
         ["robot is", drive.world.isSlipping ? `${health.state}, wheel slips` : health.state],
-        ["error now, mean", `${centimetres(lastOf(drive.errors, 1))}, ${centimetres(meanOf(drive.errors, 1))}`],
+        [
+            "error now, mean",
+            `${centimetres(lastOf(drive.errors, 1))}, ${centimetres(meanOf(drive.errors, 1))}`,
+        ],
         ["mean NEES (3 is right)", meanOf(drive.errors, 2).toFixed(1)],
         ["beacons in the map, in the room", `${health.beacons}, ${drive.world.beacons.length}`],
         ["matches right, wrong", `${right}, ${wrong}`],
@@ -132,16 +151,18 @@ function driveFigures(drive) {
 
 function showFigures(rows) {
     const table = element("figures");
-    table.replaceChildren(...rows.map(([name, value]) => {
-        const row = document.createElement("tr");
-        const head = document.createElement("th");
-        head.scope = "row";
-        head.textContent = name;
-        const cell = document.createElement("td");
-        cell.textContent = value;
-        row.append(head, cell);
-        return row;
-    }));
+    table.replaceChildren(
+        ...rows.map(([name, value]) => {
+            const row = document.createElement("tr");
+            const head = document.createElement("th");
+            head.scope = "row";
+            head.textContent = name;
+            const cell = document.createElement("td");
+            cell.textContent = value;
+            row.append(head, cell);
+            return row;
+        }),
+    );
 }
 
 function lastOf(rows, column) {
@@ -169,6 +190,12 @@ function hold(key) {
     page.held.add(key);
 }
 
+/** A pad that was pressed with a key of the keyboard. */
+function tap(key) {
+    hold(key);
+    setTimeout(() => page.held.delete(key), TAP_MS);
+}
+
 function isTyping(target) {
     return target instanceof HTMLElement && target.matches("input:not([type=checkbox]), select");
 }
@@ -190,6 +217,8 @@ function bindPads() {
     for (const pad of document.querySelectorAll("#pads button")) {
         const key = pad.dataset.key;
         pad.addEventListener("pointerdown", () => hold(key));
+        pad.addEventListener("contextmenu", (event) => event.preventDefault());
+        pad.addEventListener("click", (event) => event.detail || tap(key));
         for (const end of ["pointerup", "pointerleave", "pointercancel"]) {
             pad.addEventListener(end, () => page.held.delete(key));
         }
@@ -211,7 +240,7 @@ function bind() {
     element("restart").addEventListener("click", restart);
     element("room").addEventListener("click", backToRoom);
     element("slip").addEventListener("click", () => page.drive.world.slip());
-    element("carry").addEventListener("click", () => page.drive.world.carryAway());
+    element("carry").addEventListener("click", () => page.drive.carryAway());
     for (const id of [...NUMBERS, ...WORDS]) {
         element(id).addEventListener("input", onChoice);
     }

@@ -11,8 +11,14 @@ function drawPlots(canvas, rows) {
     const times = rows.length ? [rows[0][0], Math.max(rows[rows.length - 1][0], rows[0][0] + 1)] : [0, 1];
     const highest = Math.max(0.1, ...rows.map((row) => row[1]).filter(Number.isFinite));
     const error = { title: "error of the position, m", column: 1, low: 0, high: 1.08 * highest, marks: [] };
-    const nees = { title: "NEES of the pose: 3 is right, 95 % below the dashed line", column: 2, low: -1.3,
-        high: 3.3, marks: [NEES_95], isLog: true };
+    const nees = {
+        title: "NEES (3 is right, 95 % below the dashes)",
+        column: 2,
+        low: -1.3,
+        high: 3.3,
+        marks: [NEES_95],
+        isLog: true,
+    };
     drawPanel(pen, colours, { x: 0, y: 0, width, height: half }, times, rows, error);
     drawPanel(pen, colours, { x: 0, y: half, width, height: half }, times, rows, nees);
 }
@@ -76,5 +82,7 @@ function rule(pen, inner, py) {
 function ticksTo(high) {
     const power = 10 ** Math.floor(Math.log10(high));
     const step = [0.5, 1, 2, 5].map((part) => part * power).find((one) => high / one < 3.5);
-    return Array.from({ length: Math.floor(high / step) + 1 }, (_, index) => Number((index * step).toPrecision(3)));
+    return Array.from({ length: Math.floor(high / step) + 1 }, (_, index) =>
+        Number((index * step).toPrecision(3)),
+    );
 }

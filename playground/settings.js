@@ -34,6 +34,9 @@ function coreSettings(estimator, log, choices) {
             settings[name] = Math.max(settings[name], preset[name]);
         }
     }
+    for (const name of Object.keys(log.robot.settings || {})) {
+        requireKnown(`robot.toml, [settings], key ${name}: no such setting`, name, estimator.names);
+    }
     return { ...settings, ...log.robot.settings, recovery: choices.recovery ? 1 : 0 };
 }
 
@@ -43,7 +46,9 @@ function odometryIntervalUs(timeUs) {
 }
 
 function differences(values) {
-    return Array.from(values).slice(1).map((value, index) => value - values[index]);
+    return Array.from(values)
+        .slice(1)
+        .map((value, index) => value - values[index]);
 }
 
 function robotSettings(robot, kind) {

@@ -31,8 +31,11 @@ function simulatedRobot(choices) {
 /** Where beacons stand: each the one of some random places that is farthest from those before it. */
 function placeBeacons(random, count) {
     const beacons = [];
-    const farFrom = (place) => Math.min(Math.hypot(place.x, place.y),
-        ...beacons.map((other) => Math.hypot(place.x - other.x, place.y - other.y)));
+    const farFrom = (place) =>
+        Math.min(
+            Math.hypot(place.x, place.y),
+            ...beacons.map((other) => Math.hypot(place.x - other.x, place.y - other.y)),
+        );
     for (let id = 0; id < count; id++) {
         const places = Array.from({ length: 8 }, () => ({
             id,
@@ -45,8 +48,12 @@ function placeBeacons(random, count) {
 }
 
 function isInside(pose) {
-    return pose.x > ROOM.left + BODY_M && pose.x < ROOM.right - BODY_M
-        && pose.y > ROOM.bottom + BODY_M && pose.y < ROOM.top - BODY_M;
+    return (
+        pose.x > ROOM.left + BODY_M &&
+        pose.x < ROOM.right - BODY_M &&
+        pose.y > ROOM.bottom + BODY_M &&
+        pose.y < ROOM.top - BODY_M
+    );
 }
 
 /** Goes from one random place to the next. */
@@ -159,8 +166,11 @@ class World {
 
     measured(id, bearing, range) {
         const robot = this.robot;
-        const sd = Math.hypot(robot.range_sigma_floor_m, robot.range_sigma_fraction * range,
-            (range * range) / robot.range_sigma_scale_m);
+        const sd = Math.hypot(
+            robot.range_sigma_floor_m,
+            robot.range_sigma_fraction * range,
+            (range * range) / robot.range_sigma_scale_m,
+        );
         const bearingRad = wrapRad(bearing + robot.bearing_sigma_rad * this.sensorRandom.normal());
         const rangeM = Math.max(range + sd * this.sensorRandom.normal(), 0.01);
         return { id, bearingRad, rangeM: this.hasRange ? rangeM : NaN };

@@ -1,6 +1,6 @@
 "use strict";
-// A log tested before it is believed, in the words of host_sim/bslam/logcheck. What takes the fit of the whole
-// drive (scales, noise, mount, exchanged identities) is left to `bslam check`.
+// A log tested before it is believed, in the words of host_sim/bslam/logcheck. What takes the fit of the
+// whole drive (scales, noise, mount, exchanged identities) is left to `bslam check`.
 
 const SLIPS_MAX = 3;
 const NAMELESS_SHARE = 0.05;
@@ -12,7 +12,7 @@ const BLIND = "all else: it takes a robot that moves and beacons with identities
 const STRAIGHT = "signs and scale of the turn: it hardly turns while beacons are seen";
 const LEFT_TO_HOST = "scales, mount, noise, exchanged identities: `bslam check` tests them";
 
-/** texts: the files' contents by their names. What is wrong with them, and the log with its files put right. */
+/** texts: contents by file name. What is wrong with them, and the log with its files put right. */
 async function checkLog(name, texts) {
     const mended = { ...texts };
     const inFiles = checkFiles(mended);
@@ -61,12 +61,14 @@ function missingIdentities(log) {
     if (nameless <= NAMELESS_SHARE * ids.length) {
         return [];
     }
-    return [{
-        kind: "identities",
-        what: `${nameless} of ${ids.length} sightings have no identity`,
-        sure: "beacon_id is empty",
-        mend: "--association mahalanobis, or svm where there are signatures",
-    }];
+    return [
+        {
+            kind: "identities",
+            what: `${nameless} of ${ids.length} sightings have no identity`,
+            sure: "beacon_id is empty",
+            mend: "--association mahalanobis, or svm where there are signatures",
+        },
+    ];
 }
 
 /** Sightings of which odometry knows nothing. */
@@ -77,12 +79,14 @@ function outsideOdometry(log) {
     if (out <= OUTSIDE_SHARE * seen.length) {
         return [];
     }
-    return [{
-        kind: "stamps",
-        what: `${out} of ${seen.length} sightings are before or after odometry`,
-        sure: `they run from ${seen[0]} to ${seen[seen.length - 1]} us, odometry from ${first} to ${last}`,
-        mend: "let one clock stamp both, or shift time_us",
-    }];
+    return [
+        {
+            kind: "stamps",
+            what: `${out} of ${seen.length} sightings are before or after odometry`,
+            sure: `they run from ${seen[0]} to ${seen.at(-1)} us, odometry from ${first} to ${last}`,
+            mend: "let one clock stamp both, or shift time_us",
+        },
+    ];
 }
 
 /** Sightings that come late, or early, beyond what is told; by what odometry leaves unexplained of them. */
@@ -95,13 +99,16 @@ function delayFinding(drive, flow) {
     }
     const told = drive.delayS ? `, besides the ${(1e3 * drive.delayS).toFixed(0)} ms that are told` : "";
     const late = delayS > 0 ? "late" : "early";
-    return [{
-        kind: "delay",
-        what: `sightings come ${(1e3 * Math.abs(delayS)).toFixed(0)} ms ${late} against odometry${told}`,
-        sure: "by how bearings and ranges follow odometry, to some 20 ms; "
-            + `odometry's rows are ${(1e3 * drive.rowS).toFixed(0)} ms apart`,
-        mend: `--set sighting_delay_us=${Math.round(1e6 * (delayS + drive.delayS))}`,
-    }];
+    return [
+        {
+            kind: "delay",
+            what: `sightings come ${(1e3 * Math.abs(delayS)).toFixed(0)} ms ${late} against odometry${told}`,
+            sure:
+                "by how bearings and ranges follow odometry, to some 20 ms; " +
+                `odometry's rows are ${(1e3 * drive.rowS).toFixed(0)} ms apart`,
+            mend: `--set sighting_delay_us=${Math.round(1e6 * (delayS + drive.delayS))}`,
+        },
+    ];
 }
 
 /** Between the delays that were tried: the lowest point of a parabola through the best and its neighbours. */

@@ -1,17 +1,24 @@
 "use strict";
 // The files as they stand, before the strict reader: stamps, and directions in degrees. What is found is put
-// right in what is read next, so that the rest can be tested. In the words of host_sim/bslam/logcheck/files.py.
+// right in what is read next, so that the rest can be tested: host_sim/bslam/logcheck/files.py.
 
 const STEMS = ["odometry", "sightings", "truth"];
 const GAP_S = 1;
 const GAP_ROWS = 8;
-const TIME_UNITS = [[1e3, "milliseconds"], [1e6, "seconds"], [1e-3, "nanoseconds"]]; // by what makes them us
+const TIME_UNITS = [
+    [1e3, "milliseconds"],
+    [1e6, "seconds"],
+    [1e-3, "nanoseconds"],
+]; // by what makes them us
 const DEGREES_SHARE = 0.1;
 const SAME_UNIT = 30; // an interval that is less than so many times off is of the same unit
 
 /** A number as C's %g has it. */
 function general(value, digits = 6) {
-    const [mantissa, exponent] = value.toExponential(digits - 1).split("e").map(Number);
+    const [mantissa, exponent] = value
+        .toExponential(digits - 1)
+        .split("e")
+        .map(Number);
     if (exponent < -4 || exponent >= digits) {
         const sign = exponent < 0 ? "-" : "+";
         return `${mantissa}e${sign}${String(Math.abs(exponent)).padStart(2, "0")}`;
@@ -29,7 +36,11 @@ class RawTable {
     static read(file, text) {
         const [names, ...rows] = linesOf(text).map(fieldsOf);
         const trimmed = (names || []).map((name) => name.trim());
-        if (!trimmed.includes("time_us") || rows.length < 2 || rows.some((row) => row.length !== names.length)) {
+        if (
+            !trimmed.includes("time_us") ||
+            rows.length < 2 ||
+            rows.some((row) => row.length !== names.length)
+        ) {
             return null;
         }
         const table = new RawTable(file, trimmed, rows);
@@ -105,7 +116,11 @@ function unitBySpan(table, span) {
     }
     const last = times[times.length - 1];
     const sure = `stamps end at ${general(last, 16)}, those of odometry at ${general(span[1], 16)}`;
-    const fits = ([factor]) => shareOfSpan(times.map((time) => factor * time), span) > 0.2;
+    const fits = ([factor]) =>
+        shareOfSpan(
+            times.map((time) => factor * time),
+            span,
+        ) > 0.2;
     return otherUnit(table, sure, TIME_UNITS.filter(fits));
 }
 
@@ -143,8 +158,12 @@ function stampFindings(table, isOdometry) {
     const { file } = table;
     const findings = [
         ...rowsFinding(file, repeated, "come again", `delete the repeated rows of ${file}`),
-        ...rowsFinding(file, back, "run back in time",
-            `sort ${file} by time_us, or cut it where the clock begins again`),
+        ...rowsFinding(
+            file,
+            back,
+            "run back in time",
+            `sort ${file} by time_us, or cut it where the clock begins again`,
+        ),
     ];
     if (findings.length) {
         const order = times.map((_, row) => row).sort((a, b) => times[a] - times[b] || a - b);
@@ -156,7 +175,9 @@ function stampFindings(table, isOdometry) {
 function rowsFinding(file, marked, word, mend) {
     const count = marked.filter(Boolean).length;
     const what = `${file}: ${count} of ${marked.length} rows ${word}`;
-    return count ? [{ kind: "stamps", what, sure: `the first in line ${marked.indexOf(true) + 2}`, mend }] : [];
+    return count
+        ? [{ kind: "stamps", what, sure: `the first in line ${marked.indexOf(true) + 2}`, mend }]
+        : [];
 }
 
 function gapFindings(table) {
@@ -168,13 +189,16 @@ function gapFindings(table) {
     }
     const longest = Math.max(...gaps);
     const total = gaps.reduce((sum, one) => sum + one, 0).toFixed(1);
-    return [{
-        kind: "stamps",
-        what: `${table.file}: ${gaps.length} gaps, ${total} s without odometry`,
-        sure: `the longest is ${longest.toFixed(1)} s before line ${intervals.indexOf(longest) + 3}; `
-            + `rows are ${usual.toFixed(3)} s apart`,
-        mend: "cut the log there; or let the logger keep every row",
-    }];
+    return [
+        {
+            kind: "stamps",
+            what: `${table.file}: ${gaps.length} gaps, ${total} s without odometry`,
+            sure:
+                `the longest is ${longest.toFixed(1)} s before line ${intervals.indexOf(longest) + 3}; ` +
+                `rows are ${usual.toFixed(3)} s apart`,
+            mend: "cut the log there; or let the logger keep every row",
+        },
+    ];
 }
 
 function fileDegrees(table) {
@@ -200,8 +224,9 @@ function degreesFinding(values, file) {
     return {
         kind: "degrees",
         what: `${file}: bearing_rad is in degrees`,
-        sure: `${beyondFullTurn(values)} of ${values.length} values are beyond 2 pi; `
-            + `the largest is ${largest.toFixed(1)}`,
+        sure:
+            `${beyondFullTurn(values)} of ${values.length} values are beyond 2 pi; ` +
+            `the largest is ${largest.toFixed(1)}`,
         mend: `multiply bearing_rad of ${file} by pi/180 = 0.0174533`,
     };
 }

@@ -1,7 +1,7 @@
 "use strict";
 // How sightings move while the robot does: signs, gross factors and the delay, without a map and without a
-// start. From one sighting of a beacon to its next, the distance shrinks by the way times the bearing's cosine,
-// and the bearing falls by the turn. The same as host_sim/bslam/logcheck/drive.py and flow.py.
+// start. From one sighting of a beacon to its next, the distance shrinks by the way times the bearing's
+// cosine, and the bearing falls by the turn. The same as host_sim/bslam/logcheck/drive.py and flow.py.
 
 const SIGHTINGS_MIN = 4; // of a beacon
 const LAGS_S = [0.4, 1.2];
@@ -38,8 +38,12 @@ class CheckedDrive {
         const timeS = s.timeUs.map((time) => 1e-6 * (time - startUs));
         const hasAny = s.range.some(Number.isFinite);
         const last = this.timeS[this.timeS.length - 1];
-        const isGood = (row) => s.id[row] >= 0 && s.mappable[row] && (Number.isFinite(s.range[row]) || !hasAny)
-            && timeS[row] >= this.timeS[0] && timeS[row] <= last;
+        const isGood = (row) =>
+            s.id[row] >= 0 &&
+            s.mappable[row] &&
+            (Number.isFinite(s.range[row]) || !hasAny) &&
+            timeS[row] >= this.timeS[0] &&
+            timeS[row] <= last;
         const good = timeS.map((_, row) => row).filter(isGood);
         const counts = new Map();
         good.forEach((row) => counts.set(s.id[row], (counts.get(s.id[row]) || 0) + 1));
@@ -141,8 +145,15 @@ function flowAt(drive, pairs, delayS) {
     const wayFactor = Number.isFinite(fit.factors[0]) ? fit.factors[0] : 0;
     const shifted = bearings.change.map((change, row) => change - bearings.byWay[row] * wayFactor);
     return {
-        way: fit.factors[0], turn: fit.factors[1], wayError: fit.errors[0], turnError: fit.errors[1],
-        turnMost: mostTurn(bearings.byTurn, shifted), delayS, spread: fit.spread, turned, shifted,
+        way: fit.factors[0],
+        turn: fit.factors[1],
+        wayError: fit.errors[0],
+        turnError: fit.errors[1],
+        turnMost: mostTurn(bearings.byTurn, shifted),
+        delayS,
+        spread: fit.spread,
+        turned,
+        shifted,
     };
 }
 
@@ -166,18 +177,25 @@ function mostTurn(byTurn, left) {
 
 /** Both factors, their standard errors, and the spread; each group in units of its own scatter. */
 function robustFit(groups) {
-    const isFree = ["byWay", "byTurn"].map((name) => groups.some((group) => group[name].some((one) => one !== 0)));
+    const isFree = ["byWay", "byTurn"].map((name) =>
+        groups.some((group) => group[name].some((one) => one !== 0)),
+    );
     let left = groups.map((group) => group.change);
     let factors = [NaN, NaN];
     let square = null;
     let scatter = [];
     for (let round = 0; round < FLOW_ROUNDS; round++) {
-        scatter = left.map((values) => values.reduce((sum, one) => sum + Math.abs(one), 0) / values.length + 1e-12);
+        scatter = left.map(
+            (values) => values.reduce((sum, one) => sum + Math.abs(one), 0) / values.length + 1e-12,
+        );
         square = normalEquations(groups, left, scatter, isFree);
         factors = solve2(square, isFree);
         const used = factors.map((factor, column) => (isFree[column] ? factor : 0));
-        left = groups.map((group) => group.change.map(
-            (change, row) => change - group.byWay[row] * used[0] - group.byTurn[row] * used[1]));
+        left = groups.map((group) =>
+            group.change.map(
+                (change, row) => change - group.byWay[row] * used[0] - group.byTurn[row] * used[1],
+            ),
+        );
     }
     const spread = Math.exp(scatter.reduce((sum, one) => sum + Math.log(one), 0) / scatter.length);
     return { factors, errors: standardErrors2(square, isFree), spread };

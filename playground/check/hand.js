@@ -21,9 +21,11 @@ function multiplied(log, factors) {
         odometry: {
             kind: isVelocity ? "velocity" : "wheels",
             timeUs: isTicks ? odometry.timeUs.slice(1) : odometry.timeUs,
-            a: isVelocity ? odometry.a.map((one) => factors.way * one)
+            a: isVelocity
+                ? odometry.a.map((one) => factors.way * one)
                 : way.map((one, row) => factors.way * one - half[row]),
-            b: isVelocity ? odometry.b.map((one) => factors.turn * one)
+            b: isVelocity
+                ? odometry.b.map((one) => factors.turn * one)
                 : way.map((one, row) => factors.way * one + half[row]),
         },
         sightings: {
@@ -43,14 +45,28 @@ async function fittedReferences(log, factors) {
     const replay = await new Replay(multiplied(log, factors), choices).run();
     const found = [];
     if (log.beacons) {
-        const placeOf = new Map(log.beacons.id.map((id, row) => [id, { x: log.beacons.x[row], y: log.beacons.y[row] }]));
+        const placeOf = new Map(
+            log.beacons.id.map((id, row) => [id, { x: log.beacons.x[row], y: log.beacons.y[row] }]),
+        );
         const ours = replay.estimator.beacons().filter((one) => placeOf.has(one.label));
-        found.push(handOf("beacons.csv", ours, ours.map((one) => placeOf.get(one.label))));
+        found.push(
+            handOf(
+                "beacons.csv",
+                ours,
+                ours.map((one) => placeOf.get(one.label)),
+            ),
+        );
     }
     if (log.truth) {
         const truth = replay.timesUs.map((timeUs) => truthAt(log.truth, timeUs));
         const known = truth.map((_, row) => row).filter((row) => truth[row]);
-        found.push(handOf("truth.csv", known.map((row) => replay.poses[row]), known.map((row) => truth[row])));
+        found.push(
+            handOf(
+                "truth.csv",
+                known.map((row) => replay.poses[row]),
+                known.map((row) => truth[row]),
+            ),
+        );
     }
     return found.filter((one) => one !== null);
 }
@@ -64,7 +80,11 @@ function handOf(what, estimate, reference) {
     const middle = { x: median(reference.map(({ x }) => x)), y: median(reference.map(({ y }) => y)) };
     const near = NEAR_SHARE * median(reference.map((one) => Math.sqrt(squaredDistance(one, middle))));
     const [plain, mirrored] = [1, -1].map((sign) => {
-        const placed = placedOn(estimate.map(({ x, y }) => ({ x, y: sign * y })), reference, near);
+        const placed = placedOn(
+            estimate.map(({ x, y }) => ({ x, y: sign * y })),
+            reference,
+            near,
+        );
         const off = placed.map((one, row) => Math.sqrt(squaredDistance(one, reference[row])) / near);
         return { cost: cappedMean(off), share: off.filter((one) => one < 3).length / off.length };
     });
@@ -84,7 +104,9 @@ function placedOn(points, reference, near) {
     let [best, least] = [{ a: 1, b: 0, x: 0, y: 0 }, Infinity];
     for (const [i, j] of pairsOf(points.length)) {
         const move = similarityOf(points[i], points[j], reference[i], reference[j]);
-        const off = some.map((row) => Math.sqrt(squaredDistance(moved(move, points[row]), reference[row])) / near);
+        const off = some.map(
+            (row) => Math.sqrt(squaredDistance(moved(move, points[row]), reference[row])) / near,
+        );
         const cost = move ? cappedMean(off) : Infinity;
         [best, least] = cost < least ? [move, cost] : [best, least];
     }
@@ -97,8 +119,9 @@ function placedOn(points, reference, near) {
 /** All pairs of so many points, or a sample of them. */
 function pairsOf(count) {
     if ((count * (count - 1)) / 2 <= PAIRS_TRIED) {
-        return Array.from({ length: count }, (_, i) => i).flatMap((i) => (
-            Array.from({ length: count - i - 1 }, (_, j) => [i, i + 1 + j])));
+        return Array.from({ length: count }, (_, i) => i).flatMap((i) =>
+            Array.from({ length: count - i - 1 }, (_, j) => [i, i + 1 + j]),
+        );
     }
     const random = new Random(0);
     const one = () => Math.floor(random.uniform(0, count));
@@ -125,7 +148,9 @@ function shifted(a, b, from, to) {
 
 /** The best for all points, those far off counting less. */
 function weightedSimilarity(move, points, reference, near) {
-    const weights = points.map((point, row) => 1 / (1 + squaredDistance(moved(move, point), reference[row]) / near ** 2));
+    const weights = points.map(
+        (point, row) => 1 / (1 + squaredDistance(moved(move, point), reference[row]) / near ** 2),
+    );
     const total = sumOf(weights);
     const mean = (of) => ({
         x: sumOf(of.map((one, row) => weights[row] * one.x)) / total,

@@ -12,7 +12,8 @@ const FASTEST_MPS = 30;
 function unitSlip(log, drive, flow) {
     const costs = unitSlips(log).map((slip) => [sumOf(misfits(slip.factors, flow)), slip]);
     const [, best] = costs.reduce((least, one) => (one[0] < least[0] ? one : least));
-    let sure = `sightings show ${general(flow.way, 4)} of odometry's way and ${general(flow.turn, 4)} of its turn`;
+    const [way, turn] = [flow.way, flow.turn].map((factor) => general(factor, 4));
+    let sure = `sightings show ${way} of odometry's way and ${turn} of its turn`;
     if (isMended(best.factors, flow)) {
         return slipFinding(best, sure);
     }
@@ -43,32 +44,47 @@ function sumOf(values) {
 
 function unitSlips(log) {
     const { kind } = log.odometry;
-    const columns = (kind === "ticks" ? ["left_radius_m", "right_radius_m"] : ODOMETRY_COLUMNS[kind]).join(" and ");
+    const columns = (kind === "ticks" ? ["left_radius_m", "right_radius_m"] : ODOMETRY_COLUMNS[kind]).join(
+        " and ",
+    );
     const both = `${columns} and range_m`;
-    const slip = (slipKind, what, names, factors) => (
-        { kind: slipKind, what, columns: names, factors: { ...NO_FACTORS, ...factors } });
+    const slip = (slipKind, what, names, factors) => ({
+        kind: slipKind,
+        what,
+        columns: names,
+        factors: { ...NO_FACTORS, ...factors },
+    });
     const slips = Object.entries(UNITS).flatMap(([name, unit]) => [
         slip("units", `sightings.csv: range_m is in ${name}`, "range_m", { range: unit }),
         ...(kind === "velocity"
             ? [slip("units", `odometry.csv: v_mps is in ${name}`, "v_mps", { way: unit })]
             : [
-                slip("units", `odometry: ${columns} are in ${name}`, columns, { way: unit, turn: unit }),
-                slip("units", `odometry and sightings: ${both} are in ${name}`, both,
-                    { way: unit, turn: unit, range: unit }),
-                slip("units", `robot.toml: wheelbase_m is in ${name}`, "wheelbase_m", { turn: 1 / unit }),
-            ]),
+                  slip("units", `odometry: ${columns} are in ${name}`, columns, { way: unit, turn: unit }),
+                  slip("units", `odometry and sightings: ${both} are in ${name}`, both, {
+                      way: unit,
+                      turn: unit,
+                      range: unit,
+                  }),
+                  slip("units", `robot.toml: wheelbase_m is in ${name}`, "wheelbase_m", { turn: 1 / unit }),
+              ]),
     ]);
     if (kind === "velocity") {
-        slips.push(slip("degrees", "odometry.csv: omega_radps is in degrees", "omega_radps", { turn: DEGREE }));
-        slips.push(slip("stamps", "odometry.csv: time_us is in milliseconds", "time_us", { way: 1e3, turn: 1e3 }));
+        slips.push(
+            slip("degrees", "odometry.csv: omega_radps is in degrees", "omega_radps", { turn: DEGREE }),
+        );
+        slips.push(
+            slip("stamps", "odometry.csv: time_us is in milliseconds", "time_us", { way: 1e3, turn: 1e3 }),
+        );
     }
     return slips;
 }
 
 /** How far way and turn of the flow are, as logarithms, from what these factors would mend. */
 function misfits(factors, flow) {
-    const turns = [flow.turn, flow.turnMost].filter((one) => Number.isFinite(one) && one !== 0)
-        .map(Math.abs).sort((a, b) => a - b);
+    const turns = [flow.turn, flow.turnMost]
+        .filter((one) => Number.isFinite(one) && one !== 0)
+        .map(Math.abs)
+        .sort((a, b) => a - b);
     const nearest = Math.min(Math.max(factors.turn, turns[0]), turns[turns.length - 1]);
     const turn = turns.length ? nearest / factors.turn : 1;
     const hasWay = Number.isFinite(flow.way) && flow.way !== 0;
@@ -100,8 +116,11 @@ function signFindings(log, signed, flow, fitted) {
     } else if (!found && isMirrored) {
         const file = fitted[0].what;
         sure = `the map fits ${file} mirrored`;
-        found = ["mirrored bearings", `${file} is mirrored, or both bearings and wheels are`,
-            `multiply y_m of ${file} by -1; or ${words.mirror}, and ${words.swap}`];
+        found = [
+            "mirrored bearings",
+            `${file} is mirrored, or both bearings and wheels are`,
+            `multiply y_m of ${file} by -1; or ${words.mirror}, and ${words.swap}`,
+        ];
     }
     return found ? [{ kind: found[0], what: found[1], sure, mend: found[2] }] : [];
 }
@@ -113,7 +132,8 @@ function signWords(log) {
     const mirror = "multiply bearing_rad of sightings.csv by -1";
     const swapped = isVelocity ? "the turn has the wrong sign" : "left and right wheel are swapped";
     return {
-        swap, mirror,
+        swap,
+        mirror,
         "-1,-1": ["swapped wheels", "odometry runs backward", "change the sign of odometry"],
         "-1,1": ["mount", "the sensor looks backward", "turn sensor_yaw_rad of robot.toml by pi"],
         "1,-1": ["swapped wheels", swapped, swap],
@@ -122,11 +142,17 @@ function signWords(log) {
 }
 
 function signEvidence(flow, fitted) {
-    const [left, right] = [1, -1].map((sign) => sumOf(
-        flow.shifted.map((one, row) => Math.abs(one + sign * flow.turned[row]))) / flow.shifted.length);
+    const [left, right] = [1, -1].map(
+        (sign) =>
+            sumOf(flow.shifted.map((one, row) => Math.abs(one + sign * flow.turned[row]))) /
+            flow.shifted.length,
+    );
     const by = fitted
         ? `; with that, the map fits ${fitted.what} ${fitted.isMirrored ? "mirrored" : "unmirrored"}`
         : "; no beacons.csv or truth.csv tells which";
-    return `bearings show ${flow.turn.toFixed(3)} +- ${flow.turnError.toFixed(3)} of odometry's turn; they are off `
-        + `by ${left.toFixed(4)} rad on average as told, by ${right.toFixed(4)} with the sign changed${by}`;
+    return (
+        `bearings show ${flow.turn.toFixed(3)} +- ${flow.turnError.toFixed(3)} of odometry's turn; ` +
+        `they are off by ${left.toFixed(4)} rad on average as told, ` +
+        `by ${right.toFixed(4)} with the sign changed${by}`
+    );
 }

@@ -3,11 +3,6 @@
 
 const HEAD_ROWS = 10; // so many at the start may have stamps that the clock has not come to
 
-/** A text in quotes, as Python prints it. */
-function quoted(text) {
-    return text.includes("'") && !text.includes('"') ? `"${text}"` : `'${text.replaceAll("'", "\\'")}'`;
-}
-
 const NUMBER_TEXT = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 
 /** NaN for what is no finite number. */
@@ -45,9 +40,16 @@ class Table {
 
     /** Without the rows that are not kept. */
     only(kept) {
-        const cut = (columns) => Object.fromEntries(
-            Object.entries(columns).map(([name, column]) => [name, column.filter((_, row) => kept[row])]));
-        return new Table(this.file, cut(this.texts), cut(this.values), this.lines.filter((_, row) => kept[row]));
+        const cut = (columns) =>
+            Object.fromEntries(
+                Object.entries(columns).map(([name, column]) => [name, column.filter((_, row) => kept[row])]),
+            );
+        return new Table(
+            this.file,
+            cut(this.texts),
+            cut(this.values),
+            this.lines.filter((_, row) => kept[row]),
+        );
     }
 
     require(column, isGood, allowed) {
@@ -65,14 +67,17 @@ class Table {
 
     requireOrder(isStrict) {
         const times = this.values.time_us;
-        const rises = (row) => (isStrict ? times[row] > (times[row - 1] ?? -1) : times[row] >= (times[row - 1] ?? -1));
+        const rises = (row) =>
+            isStrict ? times[row] > (times[row - 1] ?? -1) : times[row] >= (times[row - 1] ?? -1);
         this.require("time_us", rises, `a value ${isStrict ? "above" : "not below"} that of the row before`);
     }
 
     /** Without rows that say once more, in every column, what one above says. */
     unrepeated(notes) {
         const names = Object.keys(this.values);
-        const columns = names.map((name) => (this.values[name].every(isNaN) ? this.texts[name] : this.values[name]));
+        const columns = names.map((name) =>
+            this.values[name].every(isNaN) ? this.texts[name] : this.values[name],
+        );
         const known = new Set();
         const kept = this.lines.map((_, row) => {
             const key = columns.map((column) => column[row]).join("\n");
@@ -117,20 +122,32 @@ function readTable(file, text, layouts, optional, rules) {
     matchLayout(file, names, layouts, optional, rules);
     const rows = lines.slice(1).map((line, index) => rowOf(file, line, index + 2, names.length));
     const texts = Object.fromEntries(names.map((name, place) => [name, rows.map((row) => row[place])]));
-    const values = Object.fromEntries(names.map((name) => [name, parsed(file, name, rules[name], texts[name])]));
-    return new Table(file, texts, values, rows.map((_, row) => row + 2));
+    const values = Object.fromEntries(
+        names.map((name) => [name, parsed(file, name, rules[name], texts[name])]),
+    );
+    return new Table(
+        file,
+        texts,
+        values,
+        rows.map((_, row) => row + 2),
+    );
 }
 
 function rowOf(file, line, number, width) {
     const fields = fieldsOf(line);
     if (fields.length !== width) {
-        throw new PageError(`${file}, line ${number}: ${quoted(line)} has ${fields.length} fields; allowed: ${width}`);
+        throw new PageError(
+            `${file}, line ${number}: ${quoted(line)} has ${fields.length} fields; allowed: ${width}`,
+        );
     }
     return fields.map((field) => field.trim());
 }
 
 function matchLayout(file, names, layouts, optional, rules) {
-    const required = names.filter((name) => !optional.includes(name)).sort().join();
+    const required = names
+        .filter((name) => !optional.includes(name))
+        .sort()
+        .join();
     const isUnique = new Set(names).size === names.length;
     if (isUnique && layouts.some((layout) => [...layout].sort().join() === required)) {
         return;
@@ -139,8 +156,14 @@ function matchLayout(file, names, layouts, optional, rules) {
     const extra = optional.length ? ` (and perhaps ${optional.join()})` : "";
     const missing = layouts[0].filter((name) => rules[name].why && !names.includes(name));
     const why = missing.map((name) => `; ${rules[name].why}`).join("");
-    throw new PageError(
-        `${file}, line 1: columns ${quoted(names.join())} are not allowed; allowed: ${wanted}${extra}${why}`);
+    const known = [...new Set([...layouts.flat(), ...optional])];
+    const unknown = names.find((name) => !known.includes(name)) || "";
+    const near = didYouMean(
+        unknown,
+        known.filter((name) => !names.includes(name)),
+    );
+    const said = `columns ${quoted(names.join())} are not allowed`;
+    throw new PageError(`${file}, line 1: ${said}; allowed: ${wanted}${extra}${why}${near}`);
 }
 
 function parsed(file, name, rule, texts) {
@@ -160,5 +183,7 @@ function parsed(file, name, rule, texts) {
 }
 
 function fieldError(file, line, name, text, allowed) {
-    return new PageError(`${file}, line ${line}, column ${name}: ${quoted(text)} is not allowed; allowed: ${allowed}`);
+    return new PageError(
+        `${file}, line ${line}, column ${name}: ${quoted(text)} is not allowed; allowed: ${allowed}`,
+    );
 }

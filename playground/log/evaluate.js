@@ -7,8 +7,13 @@ function evaluate(replay) {
     const isAligned = !startsAtOrigin(log);
     const truth = timesUs.map((timeUs) => log.truth && truthAt(log.truth, timeUs));
     const rows = timesUs.map((_, row) => row).filter((row) => row > 0 && truth[row]);
-    const toTruth = isAligned && rows.length > 1
-        ? fitRigid(rows.map((row) => poses[row]), rows.map((row) => truth[row])) : new Rigid();
+    const toTruth =
+        isAligned && rows.length > 1
+            ? fitRigid(
+                  rows.map((row) => poses[row]),
+                  rows.map((row) => truth[row]),
+              )
+            : new Rigid();
     const toMap = toTruth.inverse;
     const inMap = truth.map((pose) => (pose ? toMap.pose(pose) : { x: NaN, y: NaN, theta: NaN }));
     const errors = timesUs.map((timeUs, row) => {
@@ -18,7 +23,12 @@ function evaluate(replay) {
         const nees = hasNees ? poseNees(poses[row], inMap[row], replay.choices.filter) : NaN;
         return [1e-6 * (timeUs - timesUs[0]), error, nees];
     });
-    return { truth: inMap, errors, isAligned, ...evaluateMap(replay, isAligned, rows.length > 1 ? toMap : null) };
+    return {
+        truth: inMap,
+        errors,
+        isAligned,
+        ...evaluateMap(replay, isAligned, rows.length > 1 ? toMap : null),
+    };
 }
 
 /** The map by an alignment of its own, where identities say which beacon is which. */
@@ -30,9 +40,15 @@ function evaluateMap(replay, isAligned, toMapByPath) {
     }
     const known = log.beacons.id.map((id, row) => ({ id, x: log.beacons.x[row], y: log.beacons.y[row] }));
     const byId = new Map(known.map((one) => [one.id, one]));
-    const pairs = beacons.filter((one) => one.confirmed && byId.has(ledger.identity(one.uid)))
+    const pairs = beacons
+        .filter((one) => one.confirmed && byId.has(ledger.identity(one.uid)))
         .map((one) => [one, byId.get(ledger.identity(one.uid))]);
-    const toTruth = isAligned ? fitRigid(pairs.map(([one]) => one), pairs.map(([, other]) => other)) : new Rigid();
+    const toTruth = isAligned
+        ? fitRigid(
+              pairs.map(([one]) => one),
+              pairs.map(([, other]) => other),
+          )
+        : new Rigid();
     const squares = pairs.map(([one, other]) => squaredDistance(toTruth.point(one), other));
     const mapError = Math.sqrt(squares.reduce((sum, one) => sum + one, 0) / squares.length);
     const toMap = toMapByPath || toTruth.inverse;

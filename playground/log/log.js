@@ -9,17 +9,24 @@ const ODOMETRY_COLUMNS = {
     ticks: ["left_ticks", "right_ticks"],
     velocity: ["v_mps", "omega_radps"],
 };
-const SIGHTING_OPTIONAL = ["beacon_id", "range_m", "mappable", "bearing_sd_rad", "range_sd_m",
-    "range_scale_sd", "score", "beacon_class"];
+const SIGHTING_OPTIONAL = [
+    "beacon_id",
+    "range_m",
+    "mappable",
+    "bearing_sd_rad",
+    "range_sd_m",
+    "range_scale_sd",
+    "score",
+    "beacon_class",
+];
 const NO_RANGE_ALONE = "a sighting of range alone cannot be used";
-const IDENTITY_ALLOWED =
-    `an integer from 0 to ${LABEL_MAX}, a word of up to ${WORD_MAX} printable characters`;
+const IDENTITY_ALLOWED = `an integer from 0 to ${LABEL_MAX}, a word of up to ${WORD_MAX} printable characters`;
 
 const isCount = (value) => value >= 0 && value <= 2 ** 53 && Math.floor(value) === value;
-const COUNT = { allowed: "an integer from 0", holds: isCount };
+const COUNT = { allowed: "an integer from 0 to 2^53", holds: isCount };
 const NUMBER = { allowed: "a number from -1e6 to 1e6", holds: (value) => Math.abs(value) <= FARTHEST };
 const COLUMN_RULES = {
-    time_us: COUNT,
+    time_us: { ...COUNT, allowed: "an integer from 0 to 2^53, in microseconds" },
     left_m: NUMBER,
     right_m: NUMBER,
     left_ticks: COUNT,
@@ -72,20 +79,27 @@ function readLog(name, texts) {
         if (!(file in texts)) {
             const there = Object.keys(texts).join(", ");
             throw new PageError(
-                `${there}: ${file} is missing; a log needs odometry.csv, sightings.csv, robot.toml`);
+                `${there}: ${file} is missing; a log needs odometry.csv, sightings.csv, robot.toml`,
+            );
         }
     }
     const notes = [];
     const robot = readRobot("robot.toml", texts["robot.toml"]);
     const odometry = readOdometry(texts["odometry.csv"], robot, notes);
     const seen = csvTable("sightings", texts, [["time_us", "bearing_rad"]], SIGHTING_OPTIONAL)
-        .unrepeated(notes).begun(notes);
+        .unrepeated(notes)
+        .begun(notes);
     seen.requireOrder(false);
-    const placed = "beacons.csv" in texts
-        ? csvTable("beacons", texts, [["beacon_id", "x_m", "y_m"]], []).unrepeated(notes) : null;
+    const placed =
+        "beacons.csv" in texts
+            ? csvTable("beacons", texts, [["beacon_id", "x_m", "y_m"]], []).unrepeated(notes)
+            : null;
     const identities = readIdentities(seen, placed);
     return {
-        name, robot, odometry, notes,
+        name,
+        robot,
+        odometry,
+        notes,
         words: identities.words,
         sightings: sightingsOf(seen, identities.of(seen)),
         truth: "truth.csv" in texts ? readTruth(texts, notes) : null,
@@ -116,7 +130,8 @@ function readOdometry(text, robot, notes) {
 function requireTicks(table, robot) {
     if (robot.counter_bits === undefined) {
         throw new PageError(
-            `odometry.csv: ticks need ${TICK_KEYS.join(", ")} in robot.toml; allowed: all four there`);
+            `odometry.csv: ticks need ${TICK_KEYS.join(", ")} in robot.toml; allowed: all four there`,
+        );
     }
     const highest = 2 ** robot.counter_bits - 1;
     const allowed = `an integer from 0 to ${highest} (robot.toml: ${robot.counter_bits} counter_bits)`;
@@ -128,7 +143,10 @@ function requireTicks(table, robot) {
 /** Numbers for identities: their own, or where one is a word, the place of each among the sorted ones. */
 function readIdentities(seen, placed) {
     const names = new Set();
-    for (const [table, orEmpty] of [[seen, ", or empty"], [placed, ""]]) {
+    for (const [table, orEmpty] of [
+        [seen, ", or empty"],
+        [placed, ""],
+    ]) {
         const texts = table?.texts.beacon_id || [];
         const isGood = (row) => (texts[row] === "" ? orEmpty !== "" : isIdentity(texts[row]));
         if (texts.length) {
@@ -163,7 +181,7 @@ function identityName(text) {
 }
 
 function identityText(log, number) {
-    return number < 0 ? "" : log.words[number] ?? String(number);
+    return number < 0 ? "" : (log.words[number] ?? String(number));
 }
 
 function sightingsOf(table, id) {

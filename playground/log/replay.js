@@ -93,7 +93,16 @@ class Replay {
 
     read(row) {
         const { kind, timeUs, a, b, gyro, gyroSd } = this.log.odometry;
-        this.book(this.estimator.odometry(kind, timeUs[row], a[row], b[row], gyro?.[row] ?? NaN, gyroSd?.[row] ?? 0));
+        this.book(
+            this.estimator.odometry(
+                kind,
+                timeUs[row],
+                a[row],
+                b[row],
+                gyro?.[row] ?? NaN,
+                gyroSd?.[row] ?? 0,
+            ),
+        );
     }
 
     book(isTaken) {

@@ -45,36 +45,61 @@ const ROBOT_RULES = {
     },
 };
 const ROBOT_DEFAULTS = {
-    range_sigma_floor_m: 0, sensor_x_m: 0, sensor_y_m: 0, sensor_yaw_rad: 0, sighting_delay_us: 0,
-    sighting_correlation_m: 0, sighting_scale_sd: 0, wheel_noise: "speedometer", gyro_sigma_radps: 0.02,
+    range_sigma_floor_m: 0,
+    sensor_x_m: 0,
+    sensor_y_m: 0,
+    sensor_yaw_rad: 0,
+    sighting_delay_us: 0,
+    sighting_correlation_m: 0,
+    sighting_scale_sd: 0,
+    wheel_noise: "speedometer",
+    gyro_sigma_radps: 0.02,
     settings: {},
 };
-const ROBOT_REQUIRED = ["wheelbase_m", "wheel_speed_sigma_mps", "step_us", "field_of_view_rad",
-    "bearing_sigma_rad", "range_sigma_fraction", "range_sigma_scale_m"];
+const ROBOT_REQUIRED = [
+    "wheelbase_m",
+    "wheel_speed_sigma_mps",
+    "step_us",
+    "field_of_view_rad",
+    "bearing_sigma_rad",
+    "range_sigma_fraction",
+    "range_sigma_scale_m",
+];
 
 function readRobot(file, text) {
     const table = parseToml(file, text);
     for (const [key, value] of Object.entries(table)) {
-        if (!(key in ROBOT_RULES)) {
-            throw new PageError(`${file}, key ${key}: no such key; allowed: ${Object.keys(ROBOT_RULES).join(", ")}`);
-        }
+        requireKnown(`${file}, key ${key}: no such key`, key, Object.keys(ROBOT_RULES));
         if (!ROBOT_RULES[key].holds(value)) {
             const said = typeof value === "string" ? quoted(value) : value;
-            throw new PageError(`${file}, key ${key}: ${said} is not allowed; allowed: ${ROBOT_RULES[key].allowed}`);
+            const { allowed } = ROBOT_RULES[key];
+            throw new PageError(`${file}, key ${key}: ${said} is not allowed; allowed: ${allowed}`);
         }
     }
     requireKeys(file, table);
     return { ...ROBOT_DEFAULTS, ...table };
 }
 
+/** Throws PageError, which says so and what is allowed, for a name that is none of these. */
+function requireKnown(said, name, allowed) {
+    if (!allowed.includes(name)) {
+        throw new PageError(`${said}; allowed: ${allowed.join(", ")}${didYouMean(name, allowed)}`);
+    }
+}
+
 function requireKeys(file, table) {
-    const missing = ROBOT_REQUIRED.find((key) => !(key in table));
-    if (missing) {
-        throw new PageError(`${file}, key ${missing}: is missing; allowed: ${ROBOT_RULES[missing].allowed}`);
+    const [first, ...others] = ROBOT_REQUIRED.filter((key) => !(key in table));
+    if (first) {
+        const more = others.length ? `; also missing: ${others.join(", ")}` : "";
+        throw new PageError(
+            `${file}, key ${first}: is missing; allowed: ${ROBOT_RULES[first].allowed}${more}`,
+        );
     }
     const absent = TICK_KEYS.filter((key) => !(key in table));
     if (absent.length > 0 && absent.length < TICK_KEYS.length) {
-        throw new PageError(`${file}, key ${absent[0]}: is missing; allowed: all of ${TICK_KEYS.join(", ")}, or none`);
+        throw new PageError(
+            `${file}, key ${absent[0]}: is missing; allowed: all of ${TICK_KEYS.join(", ")}, or none`,
+        );
     }
 }
 
@@ -102,8 +127,9 @@ function tomlValue(file, number, line, text) {
         return word;
     }
     const bare = text.replace(/\s*#.*$/, "");
-    const value = { inf: Infinity, "+inf": Infinity, true: true, false: false }[bare]
-        ?? numberOf(bare.replace(/(\d)_(?=\d)/g, "$1"));
+    const value =
+        { inf: Infinity, "+inf": Infinity, true: true, false: false }[bare] ??
+        numberOf(bare.replace(/(\d)_(?=\d)/g, "$1"));
     if (Number.isNaN(value)) {
         throw tomlError(file, number, line);
     }
@@ -111,5 +137,7 @@ function tomlValue(file, number, line, text) {
 }
 
 function tomlError(file, number, line) {
-    return new PageError(`${file}: not TOML: ${quoted(line)} (line ${number}); allowed: lines of key = value`);
+    return new PageError(
+        `${file}: not TOML: ${quoted(line)} (line ${number}); allowed: lines of key = value`,
+    );
 }

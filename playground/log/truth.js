@@ -92,7 +92,9 @@ function odometryIncrements(log) {
 function travelOfTicks(ticks, radiusM, robot) {
     const modulus = 2 ** robot.counter_bits;
     const perTick = (2 * Math.PI * radiusM) / robot.ticks_per_revolution;
-    return differences(ticks).map((step) => (floorMod(step + 0.5 * modulus, modulus) - 0.5 * modulus) * perTick);
+    return differences(ticks).map(
+        (step) => (floorMod(step + 0.5 * modulus, modulus) - 0.5 * modulus) * perTick,
+    );
 }
 
 /** Poses of odometry alone, from the origin. */

@@ -1,5 +1,6 @@
 """The playground in a browser: the same bits as on the host, logs that are dropped, the words of `check`."""
 
+import gzip
 import subprocess
 import time
 from dataclasses import replace
@@ -151,7 +152,10 @@ def test_playground_state_is_the_hosts_to_the_bit(playground, choices):
     pose = drive["pose"]
     assert (pose["x"], pose["y"], pose["theta"]) == slam.pose()
     assert tuple(pose["lower"]) == slam.pose_covariance_lower()
-    host = [(one.uid, one.label, one.x_m, one.y_m, *one.covariance[[0, 0, 1], [0, 1, 1]]) for one in slam.beacons()]
+    host = [
+        (one.uid, one.label, one.x_m, one.y_m, *one.covariance[[0, 0, 1], [0, 1, 1]])
+        for one in slam.beacons()
+    ]
     names = ("uid", "label", "x", "y", "xx", "xy", "yy")
     assert [tuple(one[name] for name in names) for one in drive["beacons"]] == host
     assert drive["counts"]["right"] > 500
@@ -180,9 +184,9 @@ def test_playground_pauses_steps_and_starts_anew(playground):
     first = playground.evaluate("page.drive.world.step")
     playground.get_by_role("button", name="Step").click()
     assert playground.evaluate("page.drive.world.step") == first + 1
-    time_text = playground.locator("#figures td").first.inner_text()
+    text = playground.locator("#figures td").first.inner_text()
     playground.get_by_role("button", name="Go on").click()
-    expect(playground.locator("#figures td").first).not_to_have_text(time_text)
+    expect(playground.locator("#figures td").first).not_to_have_text(text)
     playground.get_by_role("button", name="Pause").click()
     playground.locator("#association").select_option("mahalanobis")
     assert playground.evaluate("page.drive.world.step === FIRST_STEPS")
@@ -227,6 +231,76 @@ def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
     playground.wait_for_timeout(300)
     poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
     assert poses[-1] == last.tolist()
+
+
+def without(name):
+    return lambda texts: {key: text for key, text in texts.items() if key != name}
+
+
+def instead(name, change):
+    return lambda texts: {**texts, name: change(texts[name])}
+
+
+BAD_DROPS = {
+    "another file": (lambda _: {"holiday.csv": "a,b\n1,2\n"}, "holiday.csv: no file of a log"),
+    "no robot.toml": (without("robot.toml"), "robot.toml is missing"),
+    "no sightings": (without("sightings.csv"), "sightings.csv is missing"),
+    "no rows": (instead("odometry.csv", lambda text: text.splitlines()[0]), "odometry.csv: no rows below"),
+    "columns": (
+        instead("odometry.csv", lambda text: text.replace("left_m", "lef_m")),
+        "odometry.csv, line 1: columns 'time_us,lef_m,right_m' are not allowed; allowed: time_us,",
+    ),
+    "a word": (
+        instead("sightings.csv", lambda text: text.replace("0.", "zero", 1)),
+        "sightings.csv, line 2, column",
+    ),
+    "a short row": (instead("odometry.csv", lambda text: text + "1,2\n"), "'1,2' has 2 fields; allowed: 3"),
+    "a picture": (instead("odometry.csv", lambda _: "\x89PNG\0"), "odometry.csv, line 1: columns"),
+    "no TOML": (instead("robot.toml", lambda _: "wheels: 2"), "robot.toml: not TOML: 'wheels: 2' (line 1)"),
+    "a key": (
+        instead("robot.toml", lambda text: text.replace("wheelbase_m", "wheelbase")),
+        "robot.toml, key wheelbase: no such key; allowed: wheelbase_m,",
+    ),
+    "beyond its range": (
+        instead("robot.toml", lambda text: text.replace("wheelbase_m = 0.3", "wheelbase_m = 300")),
+        "robot.toml, key wheelbase_m: 300 is not allowed; allowed: a number from 0.001 to 10",
+    ),
+    "a setting": (
+        instead("robot.toml", lambda text: text + "[settings]\nfilte = 1\n"),
+        "robot.toml, [settings], key filte: no such setting; allowed: wheelbase_m,",
+    ),
+}
+
+
+def test_playground_names_what_is_no_log_and_stays_as_it_is(playground, tmp_path):
+    good = texts_of(folder_of(made_up(seconds=10.0), tmp_path / "drive"))
+    before = figures(playground)
+    for change, message in BAD_DROPS.values():
+        playground.evaluate("say('')")
+        playground.evaluate(DROP, change(good))
+        expect(playground.locator("#message")).to_contain_text(message)
+        assert "allowed" in (said := playground.locator("#message").inner_text()) or "needs" in said
+        assert "\n" not in said
+        assert figures(playground) == before
+        expect(playground.locator("#title")).to_have_text("A robot in a room")
+
+
+def test_playground_says_what_the_strict_reader_says(playground, tmp_path):
+    good = folder_of(made_up(seconds=10.0), tmp_path / "drive")
+    texts = texts_of(good)
+    for name in ("no rows", "columns", "a word", "a short row", "a key", "beyond its range"):
+        changed = BAD_DROPS[name][0](texts)
+        for path in good.iterdir():
+            path.unlink()
+        for file, text in changed.items():
+            (good / file).write_text(text)
+        with pytest.raises(BslamError) as refused:
+            Log.read(good)
+        playground.evaluate("say('')")
+        playground.evaluate(DROP, changed)
+        expect(playground.locator("#message")).to_be_visible()
+        said = playground.locator("#message").inner_text()
+        assert str(refused.value).replace(f"{good}/", "").split("; a log needs")[0].split(": ", 1)[1] in said
 
 
 def scaled(text: str, column: str, factor: float, whole: bool = False) -> str:
@@ -314,3 +388,27 @@ def test_playground_says_of_spoilt_files_what_check_says(playground, tmp_path):
         folder = folder_of(made_up(seconds=40.0), tmp_path / name)
         (folder / file).write_text(spoil((folder / file).read_text()))
         both_say(playground, folder)
+
+
+@pytest.mark.parametrize("delay_s", [0.12, 0.35])
+def test_playground_a_delay_is_named_nearly_as_check_names_it(playground, tmp_path, delay_s):
+    log = made_up()
+    late = with_sightings(log, time_us=log.sightings.time_us + round(1e6 * delay_s))
+    texts = texts_of(folder_of(late, tmp_path / "drive"))
+    (found,) = playground.evaluate("async texts => (await checkLog('log', texts)).findings", texts)
+    assert found["kind"] == "delay" and "ms late against odometry" in found["what"]
+    setting, value_us = found["mend"].split("=")
+    assert setting == "--set sighting_delay_us"
+    assert int(value_us) == pytest.approx(1e6 * delay_s, abs=30_000)
+
+
+def test_playground_takes_files_that_are_chosen_and_packed(playground, tmp_path):
+    folder = folder_of(with_robot(made_up(seconds=20.0), sensor_yaw_rad=0.5), tmp_path / "drive")
+    packed = folder / "odometry.csv.gz"
+    packed.write_bytes(gzip.compress((folder / "odometry.csv").read_bytes()))
+    (folder / "odometry.csv").unlink()
+    playground.locator("#files").set_input_files(sorted(folder.iterdir()))
+    expect(playground.locator("#back")).to_be_visible()
+    trace = run_log(Log.read(folder), RunOptions(sensor="recorded"))
+    poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
+    assert poses[-1] == trace.pose[-1].tolist()
