@@ -6,7 +6,6 @@ where, and what is allowed.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -34,6 +33,7 @@ from bslam.commands import (
     sweep,
     tables,
 )
+from bslam.commands.helping import ShortHelp
 from bslam.commands.parser import Parser
 from bslam.errors import BslamError, did_you_mean
 
@@ -96,7 +96,7 @@ def _parser(name: str, command: ModuleType) -> Parser:
         prog=f"bslam {name}",
         description=command.SUMMARY,
         epilog=command.EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=ShortHelp,
         allow_abbrev=False,
     )
     command.add_arguments(parser)

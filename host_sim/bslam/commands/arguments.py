@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import joblib
 
+from bslam.commands.helping import more_options
 from bslam.core.presets import PRESETS
 from bslam.core.slam import Slam
 from bslam.errors import BslamError, did_you_mean
@@ -41,9 +42,13 @@ CAMERA_STORE = Path("out") / "camera"
 DEFAULT_RIG = "three60"
 
 
-def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = ()) -> None:
-    """How the filter runs. `lists` names the options that take several values, with commas between."""
-    group = parser.add_argument_group("filter")
+def add_filter_options(
+    parser: argparse.ArgumentParser, lists: Container[str] = (), folded: bool = False
+) -> None:
+    """How the filter runs. `lists` names the options that take several values, with commas between; folded:
+    all of them are among the "more options" of the help.
+    """
+    group = more_options(parser) if folded else parser.add_argument_group("filter")
 
     def add(name: str, parse: Callable[[str], Any], default: Any, shape: str, meaning: str) -> None:
         if name in lists:
@@ -54,32 +59,36 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "observation",
         _word(OBSERVATIONS),
         "distance" if "observation" in lists else None,
-        _names(OBSERVATIONS),
-        "what a sighting tells (default: distance, and direction on a log without any)",
+        "WHAT",
+        "distance (with bearing), or direction: bearing-only (default: as the log)",
     )
-    associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
-    meaning = (
-        "whose a sighting is; known:RATE: identity wrong at that rate (default: both where sightings have "
-        "signatures and the map is not known, else known; mahalanobis on a log without identities)"
-    )
-    add("association", _association, None, associations, meaning)
-    meaning = (
-        "what estimates (default: invariant; smoother where sightings tell a direction only and the map is "
-        "not known)"
-    )
-    add("filter", _word(FILTERS), None, _names(FILTERS), meaning)
+    meaning = f"whose a sighting is: known:RATE, {', '.join(ASSOCIATIONS)} (default: as the sightings allow)"
+    add("association", _association, None, "METHOD", meaning)
+    meaning = f"{', '.join(FILTERS)} (default: invariant; bearing-only: smoother)"
+    add("filter", _word(FILTERS), None, "NAME", meaning)
+    meaning = "noise of a wheel's speed (default: as the scenario or log says)"
+    add("sigma", _sigma_mps, None, "M/S", meaning)
     group.add_argument(
         "--preset",
         dest="presets",
         action="append",
         type=_word(PRESETS),
         default=[],
-        metavar=_names(PRESETS),
-        help="settings to start from; repeated: one on top of the other (default: by what the scenario or "
-        "the log says of itself)",
+        metavar="NAME",
+        help=f"settings: {', '.join(PRESETS)}; may be repeated (default: by what the log says)",
     )
-    meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
-    add("sigma", _sigma_mps, None, "M/S", meaning)
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any setting (see `bslam params`); wins over all else; may be repeated",
+    )
+    _add_more_options(more_options(parser))
+
+
+def _add_more_options(group: Any) -> None:
+    """Which core runs where, and what few users change."""
     group.add_argument("--motion", choices=MOTIONS, default="arc", help="odometry step (default: arc)")
     group.add_argument(
         "--velocity-states",
@@ -92,11 +101,9 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         choices=WHEEL_NOISES,
         help="what errs: the reading or the motion (default: as the scenario or log says)",
     )
-    _add_core_options(group)
-
-
-def _add_core_options(group: Any) -> None:
-    """Which core runs where, and its settings one by one."""
+    group.add_argument(
+        "--params", type=Path, metavar="FILE", help="TOML file of settings, as `calibrate` writes"
+    )
     group.add_argument(
         "--target",
         type=_target,
@@ -108,16 +115,6 @@ def _add_core_options(group: Any) -> None:
         "--real", choices=REALS, default="float", help="scalar type: float as on the target, or double"
     )
     _add_map_options(group)
-    group.add_argument(
-        "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
-    )
-    group.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="any core parameter (see `bslam params`); wins over all else; may be repeated",
-    )
 
 
 def _add_map_options(group: Any) -> None:
@@ -150,19 +147,15 @@ def add_sensor_options(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         choices=SENSORS,
         default="simulated",
-        help="simulated: sightings from geometry; camera: rendered images, looked at (default: simulated)",
+        metavar="WHICH",
+        help="simulated: from geometry (default); camera: rendered images, looked at",
+    )
+    group = more_options(parser)
+    group.add_argument(
+        "--rig", help="cameras: three60, wide180, pan60, or a TOML file (default: the scenario's)"
     )
     group.add_argument(
-        "--rig",
-        metavar="RIG",
-        help="the cameras: three60, wide180, pan60, or the path of a TOML file "
-        f"(default: the scenario's, or {DEFAULT_RIG})",
-    )
-    group.add_argument(
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="camera: your own kinds, the .json of `bslam detect train` (default: the built-in kinds)",
+        "--model", type=Path, metavar="FILE", help="camera: your own kinds, the .json of `bslam detect train`"
     )
 
 
@@ -196,8 +189,8 @@ def add_align_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--align",
         choices=ALIGNMENTS,
-        help="of the estimate to the truth before it is scored (default: none where the truth starts at the "
-        "robot, rigid where it has a frame of its own)",
+        metavar="HOW",
+        help=f"to the truth before scoring: {', '.join(ALIGNMENTS)} (default: as the truth needs it)",
     )
 
 
@@ -212,7 +205,7 @@ def add_algorithm_options(parser: argparse.ArgumentParser) -> Any:
         metavar="MODULE:CLASS",
         help="an algorithm of your own; may be repeated",
     )
-    group.add_argument(
+    more_options(parser).add_argument(
         "--call-limit",
         type=positive_number,
         default=60.0,

@@ -38,10 +38,11 @@ EXAMPLES = """examples:
   bslam compare paper_room --with my_slam.py:MySlam --only bslam,map --sigma 0.6 --seeds 0:8
   bslam compare out/run/paper_room_seed0 --association known
 
-SCENARIO is a name, the path of a TOML file, or a log folder, which `bslam run --record` leaves. --with names
-a class by module (found from the working directory, or installed) or by file; docs/PLUGIN.md says what it
-must offer. Without --only all that are installed run: bslam, dead_reckoning, map (the exact causal MAP, the
-bound), isam2 (GTSAM), mrpt.
+SCENARIO is a name, the path of a TOML file, or a log folder, which `bslam run --record` leaves.
+
+--with names a class by module (found from the working directory, or installed) or by file; docs/PLUGIN.md
+says what it must offer. Without --only all that are installed run: bslam, dead_reckoning, map (the exact
+causal MAP, the bound), isam2 (GTSAM), mrpt.
 The table's ratio is to the map at the steps at which that is solved. compare.json has the table, summary.json
 the runs, compare.png the errors over time."""
 

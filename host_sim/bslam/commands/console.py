@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("console")
     group.add_argument("--record", type=Path, metavar="FILE", help="write a recording, FILE.mcap")
     group.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="end after so long")
-    add_filter_options(parser)
+    add_filter_options(parser, folded=True)
 
 
 def execute(arguments: argparse.Namespace) -> int:

@@ -46,7 +46,6 @@ EXAMPLES = """examples:
   bslam live paper_room --sensor camera
   bslam live pairs --association mahalanobis --paused
   bslam live out/run/paper_room_seed0.mcap
-  bslam live csv out/run/paper_room_seed0
   bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
   bslam live paper_room --target qemu:mps2_an386
   bslam live csv my_drive --rerun        (pip install rerun-sdk)
@@ -78,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_speed,
         default=1.0,
         metavar="TIMES",
-        help="so many times as fast as the robot drives, or inf: as fast as it goes (default: 1)",
+        help="times as fast as the robot drives; inf: as fast as it goes (default: 1)",
     )
     group.add_argument(
         "--rerun",
@@ -88,7 +87,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Rerun's viewer, or into a file for it, in place of the page",
     )
     group.add_argument("--paused", action="store_true", help="wait at the start for Play or Step")
-    group = parser.add_argument_group("run")
     group.add_argument("--seed", type=whole_number, default=0, metavar="N", help="default: 0")
     group.add_argument(
         "--out",

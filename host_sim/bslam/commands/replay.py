@@ -38,6 +38,7 @@ EXAMPLES = """examples:
 A recording (.mcap) runs again as it ran: its own inputs in their order with its own parameters, and every
 state is held against the recorded one; exit status 1 if a bit differs. With --set or --params it runs
 otherwise, and nothing is compared.
+
 csv: DIR is a folder with odometry.csv, sightings.csv, robot.toml and, if known, truth.csv and beacons.csv.
 mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mapping data; all robots without
 --robot.

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record",
         action="store_true",
-        help="write each log as a folder NAME and each run as NAME.mcap, too (see `replay`)",
+        help="keep the log as a folder NAME, the run as NAME.mcap (see `replay`)",
     )
     add_sensor_options(parser)
     add_filter_options(parser)

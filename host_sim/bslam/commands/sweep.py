@@ -21,6 +21,7 @@ from bslam.commands.arguments import (
 )
 from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
+from bslam.commands.helping import more_options
 from bslam.commands.report import HEADINGS, mean_row, table_of
 from bslam.errors import BslamError
 from bslam.evaluation.consistency import half_interval_95, share_interval_95
@@ -53,7 +54,8 @@ EXAMPLES = """examples:
   bslam sweep paper_room --with my_slam:MySlam --seeds 0:100
   bslam sweep gates.toml --cluster tcp://10.0.0.1:8786 --no-files
 
-A sweep file (TOML) holds the options by their names, with underscores, and lists where there are several:
+A sweep file (TOML) holds the options by their names, with underscores, and lists for several values.
+
   scenarios = ["paper_room", "pairs"]
   seeds = "0:100"
   sigma = [0.3, 1.0]
@@ -81,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "scenario", metavar="FILE", help="a sweep file; or a scenario, by name or path of a TOML file"
     )
     add_restart_option(parser)
-    parser.add_argument(
+    more_options(parser).add_argument(
         "--cluster", metavar="ADDRESS", help="a Dask scheduler whose workers make the runs, tcp://HOST:PORT"
     )
     _add_run_options(parser)

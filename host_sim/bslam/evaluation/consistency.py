@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bslam.evaluation.align import wrap_angle
 
 POSE_95: Final = 7.815  # chi-square, 3 degrees of freedom: 95 % of a consistent filter's NEES lie below
+RUNS_FOR_INTERVAL: Final = 5
 SINGULAR: Final = 1e9  # stands for the infinite NEES of a covariance that is not positive definite
 
 
@@ -94,17 +95,18 @@ def nees_band_95(runs: int, dof: int = 3) -> tuple[float, float]:
 
 
 def half_interval_95(values: Sequence[float]) -> float | None:
-    """Half of the 95 % interval of the mean of `values`, by their scatter and Student's t; None below two.
+    """Half of the 95 % interval of the mean of `values`, by their scatter and Student's t.
 
-    The quantile of one and two degrees of freedom is known in closed form; the others by Cornish and Fisher's
-    expansion about the normal, within 1 %.
+    None below RUNS_FOR_INTERVAL: the scatter of so few says little (of two values the interval would be nine
+    times as wide as they lie apart). The quantile is Cornish and Fisher's expansion about the normal, within
+    0.5 %.
     """
-    if len(values) < 2:
+    if len(values) < RUNS_FOR_INTERVAL:
         return None
     z, dof = 1.959964, len(values) - 1
     first, second = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
     third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
-    quantile = {1: 12.7062, 2: 4.3027}.get(dof, z + first / dof + second / dof**2 + third / dof**3)
+    quantile = z + first / dof + second / dof**2 + third / dof**3
     return float(quantile * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from bslam.cli import main
 from bslam.evaluation.metrics import evaluate, summarise
-from bslam.log import Log, first_steps, read_folder
+from bslam.log import Log, first_steps
 from bslam.logcheck.check import check_log
 from bslam.options import RunOptions
 from bslam.ros2.importer import Request, import_bag
@@ -155,7 +155,7 @@ def test_tags_are_replayed_about_as_well_as_the_direct_log(
     out = tmp_path / "drive"
     words = ["import", "ros2", str(tags), "--tags", str(sizes), "--image", "raw", "--wheelbase", "0.4"]
     assert main([*words, "--truth", "/mocap", "--out", str(out)]) == 0
-    log = read_folder(out)
+    log = Log.read(out)
     assert not [one for one in check_log(log).findings if not one.is_note]
     # Fewer beacons are in the camera's image than in the simulated sensor's; what is seen is seen better.
     assert replayed_error_m(log) < 1.2 * direct_error_m
@@ -168,7 +168,7 @@ def test_a_folder_that_is_there_keeps_what_is_no_log(tmp_path: Path, aruco: Path
     assert sorted(one.name for one in tmp_path.iterdir()) == [
         "notes.txt", "odometry.csv", "robot.toml", "sightings.csv",
     ]  # fmt: skip
-    read_folder(tmp_path)
+    Log.read(tmp_path)
 
 
 # --- bad input ----------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import json
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -113,6 +114,19 @@ def test_every_command_has_help_with_an_example(name, capsys):
     text = capsys.readouterr().out
     assert "examples:" in text
     assert f"bslam {name}" in text.split("examples:")[1]
+    assert len(text.splitlines()) <= 49
+    assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("name", ["run", "replay", "compare", "sweep", "stress", "tables", "live", "console"])
+def test_options_that_help_only_names_are_explained_on_demand(name, capsys):
+    assert status_of([name, "--help"]) == 0
+    text = capsys.readouterr().out
+    (named,) = re.findall(r"more options, explained by --help-all:\n((?:--.*\n)+)", text)
+    assert {"--motion", "--target", "--recovery"} <= set(re.findall(r"--[a-z-]+", named))
+    assert status_of([name, "--help-all"]) == 0
+    explained = set(re.findall(r"^  (--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
+    assert set(re.findall(r"--[a-z-]+", named)) <= explained
 
 
 def test_the_overview_lists_every_command(capsys):

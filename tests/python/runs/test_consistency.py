@@ -9,6 +9,7 @@ from bslam.evaluation.consistency import (
     SINGULAR,
     error_invariant,
     error_standard,
+    half_interval_95,
     nees,
     nees_band_95,
 )
@@ -96,3 +97,9 @@ def test_nees_of_a_covariance_that_is_not_definite_is_singular(name):
 )
 def test_nees_band_holds_the_quantiles_of_chi_square(runs, low, high):
     np.testing.assert_allclose(nees_band_95(runs), (low / runs, high / runs), rtol=0.03)
+
+
+def test_interval_of_a_mean_needs_five_runs():
+    assert half_interval_95([1.0, 2.0, 3.0, 4.0]) is None
+    # Student's t of 4 degrees of freedom: 2.7764, times the root of 2.5 / 5.
+    assert half_interval_95([1.0, 2.0, 3.0, 4.0, 5.0]) == pytest.approx(2.7764 * 0.5**0.5, rel=0.005)

@@ -233,7 +233,7 @@ def test_stress_refuses_by_name_and_runs_nothing(
 
 def test_help_names_every_row(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["stress", "--help"])
+        main(["stress", "--help-all"])
     said = capsys.readouterr().out
     assert ended.value.code == 0
     assert "bslam stress paper_room" in said
