@@ -29,6 +29,12 @@ class Told:
     beacon_uid: int | None
     test_ratio: float | None  # innovation squared over the gate's bound: above 1 it is rejected
     weight: float
+    wrong: bool = False  # matched with another beacon, or a new one of a beacon that is in the map
+
+    @property
+    def verdict(self) -> str:
+        """The result, or "wrong"."""
+        return "wrong" if self.wrong else self.result
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ class Box:
 
     outline: tuple[float, float, float, float]  # left, top, right, bottom
     lines: tuple[str, ...]
-    result: str  # what became of its sighting, as in Told; "": nothing yet
+    result: str  # what became of its sighting, as in Told, or "wrong"; "": nothing yet
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,7 @@ class Moment:
     course: Course
     covariance_m2: NDArray[np.float64]  # (2, 2) of the position
     beacons: Sequence[Spot]
-    true_beacons_m: NDArray[np.float64]  # (b, 2)
+    true_beacons_m: NDArray[np.float64]  # (b, 2), in the order of Stage.beacon_id
     frame: Sequence[Told]  # the newest frame, if it belongs to this step
     told: Sequence[Told]  # the newest sightings, the last first
     shown: Shown | None = None
@@ -97,6 +103,7 @@ class Stage:
     steps: int
     walls_m: NDArray[np.float64]  # (w, 4) x1, y1, x2, y2
     beacon_id: NDArray[np.int64]  # (b,) of the true beacons
+    beacon_name: tuple[str, ...] = ()  # (b,) of them, as the log has it
     sensor: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x m, y m, yaw rad on the robot
     aligned: bool = False  # the truth has a frame of its own, and is moved to fit the estimate so far
     has_camera: bool = False

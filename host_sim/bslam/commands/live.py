@@ -8,8 +8,6 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from bslam.commands.arguments import (
     add_filter_options,
     add_sensor_options,
@@ -22,9 +20,8 @@ from bslam.commands.drawing import draw
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
 from bslam.errors import BslamError
-from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log
-from bslam.moment import FAILED, Stage
+from bslam.moment import FAILED
 from bslam.options import RunOptions
 from bslam.recording.reader import SUFFIX
 from bslam.rig import load_rig
@@ -36,6 +33,7 @@ from bslam.runs.player import Player
 from bslam.runs.rerun import options_of
 from bslam.runs.runner import Watcher
 from bslam.runs.sources import CameraSource, RecordingSource, Source
+from bslam.runs.stage import stage_of
 from bslam.view.rerun_view import Scene, follow, open_stream
 from bslam.world.simulate import load_scenario
 
@@ -150,7 +148,7 @@ class _Show:
 
     def __init__(self, job: Job, out: Path, speed: float) -> None:
         log, eye = _open(job)
-        self.stage = _stage(job, log)
+        self.stage = stage_of(job, log)
         self.opened = False
         self._job, self._log, self._out = job, log, out
         self._outcome: Outcome | None = None
@@ -212,30 +210,6 @@ def _open(job: Job) -> tuple[Log, Eye | None]:
     chosen = source.threshold, source.scanner()
     log, glances = unseen_log(scenario, source.seed, source.sigma_mps, source.noise, rig, *chosen)
     return log, Eye(log, job.options, glances)
-
-
-def _stage(job: Job, log: Log) -> Stage:
-    walls_m = job.source.walls_m()
-    points = [walls_m.reshape(-1, 2), np.zeros((1, 2))]
-    aligned = log.truth is not None and not starts_at_origin(log)
-    if log.truth is not None and not aligned:
-        points.append(np.column_stack([log.truth.x_m, log.truth.y_m]))
-    if log.beacons is not None and not aligned:
-        points.append(np.column_stack([log.beacons.x_m, log.beacons.y_m]))
-    robot = log.robot
-    low_m, high_m = np.nanmin(np.concatenate(points), axis=0), np.nanmax(np.concatenate(points), axis=0)
-    margin_m = 0.5 if len(points) > 2 else 8.0  # of a log whose truth has its own frame nobody knows
-    extent_m = (*(low_m - margin_m).tolist(), *(high_m + margin_m).tolist())
-    return Stage(
-        title=f"{job.name}, {job.options.association_name}, {job.options.filter}",
-        steps=len(step_times_us(log)) - 1,
-        walls_m=walls_m,
-        beacon_id=np.empty(0, np.int64) if log.beacons is None else log.beacons.beacon_id,
-        sensor=(robot.sensor_x_m, robot.sensor_y_m, robot.sensor_yaw_rad),
-        aligned=aligned,
-        has_camera=job.options.sensor == "camera",
-        extent_m=extent_m,
-    )
 
 
 def _port(text: str) -> int:

@@ -46,15 +46,23 @@ class Ledger:
         self._shown: defaultdict[int, Counter[int]] = defaultdict(Counter)  # by beacon, identity: sightings
         self._counts: Counter[str] = Counter()
 
-    def book(self, true_id: Sequence[int], mappable: Sequence[bool], accounts: Sequence[AccountLike]) -> None:
-        """Enter one frame, right after the core has worked it off."""
+    def book(
+        self, true_id: Sequence[int], mappable: Sequence[bool], accounts: Sequence[AccountLike]
+    ) -> list[bool]:
+        """Enter one frame, right after the core has worked it off; of each sighting, whether it was wrong:
+        matched with another beacon, or a new one of a beacon that is in the map.
+        """
+        wrong = []
         made = {account.beacon_uid for account in accounts if account.result == "new"}
         unused = any(account.result in ("rejected", "deferred") for account in accounts)
         mapped = self._identities_in_map(made) if made or unused else set()
         for identity, is_mappable, account in zip(true_id, mappable, accounts, strict=True):
+            before = self._counts["wrong"] + self._counts["false_new"]
             self._book_one(identity if is_mappable else CLUTTER, account, mapped)
+            wrong.append(self._counts["wrong"] + self._counts["false_new"] > before)
             if account.reason == "class":
                 self._counts["moving"] += 1
+        return wrong
 
     def book_refused(self, true_id: Sequence[int], mappable: Sequence[bool]) -> None:
         """Enter a frame that the core refused as a whole."""

@@ -75,7 +75,9 @@ class Eye:
         glance = self._glance
         if glance is None:
             return None
-        told = [one.result for one in frame] if len(frame) == len(glance.rows) else [""] * len(glance.rows)
+        told = [""] * len(glance.rows)
+        if len(frame) == len(told):
+            told = [one.verdict for one in frame]
         pairs = zip(glance.candidates, told, strict=True)
         boxes = [Box(one.outline, _lines(one), result) for one, result in pairs]
         return Shown(glance.rgb, boxes, f"camera {glance.camera}, {glance.step * self._step_us * 1e-6:.2f} s")

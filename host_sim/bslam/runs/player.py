@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.evaluation.align import Rigid, fit_rigid, wrap_angle
+from bslam.evaluation.ledger import Ledger
 from bslam.evaluation.truth import step_times_us, truth_at
 from bslam.log import Log
 from bslam.moment import FAILED, FINISHED, PAUSED, RUNNING, Course, Moment, Spot, Told
 from bslam.runs.eye import Eye
-from bslam.runs.runner import Watcher
+from bslam.runs.runner import MAPPABLE, Watcher
 
 _PUBLISH_S: Final = 0.03  # moments that follow each other sooner nobody sees
 _ALIGN_S: Final = 1.0
@@ -125,7 +126,7 @@ class Player:
     ) -> None:
         self.pace = Pace(speed)
         self._run_it = run
-        self._books = _Books(log, align, eye)
+        self._books = Books(log, align, eye)
         self._published_s, self._stale = 0.0, False
         self.moment = self._books.moment(PAUSED)
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
@@ -177,7 +178,7 @@ class Player:
             self.moment = self._books.moment(state)
 
 
-class _Books:
+class Books:
     """What there is to say of a run so far."""
 
     def __init__(self, log: Log, align: bool, eye: Eye | None) -> None:
@@ -195,6 +196,7 @@ class _Books:
         self._own_frame = (self._truth, self._beacons_m) if align else None
         self._aligned_s = 0.0
         self._slam: Any = None
+        self._ledger = Ledger(lambda: [one.uid for one in self._slam.beacons()] if self._slam else [])
         self._beacons: tuple[Spot, ...] = ()
         self._covariance_m2 = np.zeros((2, 2))
         self._step = -1
@@ -208,8 +210,12 @@ class _Books:
     ) -> None:
         """A frame: its bearings and ranges are the first two columns."""
         time_s = (time_us - self.start_us) * 1e-6
+        if accounts is None:
+            wrong = [False] * len(true_id)
+        else:
+            wrong = self._ledger.book(true_id, columns[MAPPABLE], accounts)
         told = [
-            _told(time_s, *row, None if accounts is None else accounts[index])
+            _told(time_s, *row, None if accounts is None else accounts[index], wrong[index])
             for index, row in enumerate(zip(columns[0], columns[1], true_id, strict=True))
         ]
         self._entered += told
@@ -226,6 +232,11 @@ class _Books:
         self._sd_m[row] = math.sqrt(max(xx + yy, 0.0))
         x_m, y_m, _ = self._truth[row]
         self._error_m[row] = math.hypot(pose[0] - x_m, pose[1] - y_m)
+
+    @property
+    def rows(self) -> int:
+        """Steps, the start among them."""
+        return len(self._time_s)
 
     @property
     def at_end(self) -> bool:
@@ -275,12 +286,12 @@ class _Books:
         self._error_m = np.hypot(away_m[:, 0], away_m[:, 1])
 
 
-def _told(time_s: float, bearing_rad: float, range_m: float, true_id: int, account: Any) -> Told:
+def _told(time_s: float, bearing_rad: float, range_m: float, true_id: int, account: Any, wrong: bool) -> Told:
     seen = (time_s, bearing_rad, range_m if math.isfinite(range_m) else None, true_id)
     if account is None:
         return Told(*seen, "refused", "frame", None, None, 0.0)
     rest = (account.result, account.reason, account.beacon_uid, account.test_ratio, account.weight)
-    return Told(*seen, *rest)
+    return Told(*seen, *rest, wrong=wrong)
 
 
 def _spot(beacon: Any) -> Spot:

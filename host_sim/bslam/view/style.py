@@ -16,6 +16,17 @@ SECOND: Final = "#d1495b"
 BEACON: Final = "#ffd34d"
 WALL: Final = "#222222"
 BAND: Final = "#4c9f70"
+# By what became of a sighting: colours that stay apart for the colour-blind, and are dark enough for words.
+WRONG_RESULT: Final = "wrong"
+RESULT_COLOURS: Final = {
+    "matched": "#00795c",
+    "new": "#0067a8",
+    WRONG_RESULT: "#c44601",
+    "deferred": "#8a6d00",
+    "rejected": "#8f4a80",
+    "refused": "#8f4a80",
+}
+RESULT_DASHES: Final = {"deferred": "dashed", "rejected": "dotted", "refused": "dotted"}
 _DPI: Final = 110
 
 

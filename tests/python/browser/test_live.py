@@ -149,6 +149,27 @@ def test_live_recording_plays_as_it_was_recorded(page: Page, short: Path, tmp_pa
     assert entry["recording"]["different"] == 0 and entry["recording"]["states"] > 50
 
 
+def test_live_says_what_was_wrong_and_fits_a_phone(page: Page, short: Path, tmp_path: Path) -> None:
+    words = [short, "--association", "known:0.4", "--set", "gate_d2=0", "--speed", "inf"]
+    page.set_viewport_size({"width": 360, "height": 740})
+    with live(*words, out=tmp_path) as command:
+        page.goto(command.url)
+        expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
+        expect(page.get_by_role("heading", name="bslam live: short_seed0: known:0.4")).to_be_visible()
+        wrong = page.get_by_text(re.compile(r"(fused|new beacon), WRONG")).first
+        right = page.get_by_text("fused", exact=True).nth(1)  # the first is the legend's
+        expect(wrong).to_be_visible()
+        colours = [one.evaluate("one => getComputedStyle(one).color") for one in (wrong, right)]
+        assert colours[0] != colours[1]
+        # The legend has the colours that rows and rays have.
+        drawn = page.locator(".key line").evaluate_all("all => all.map(one => getComputedStyle(one).stroke)")
+        assert set(colours) <= set(drawn)
+        for width in (360, 700, 1920):
+            page.set_viewport_size({"width": width, "height": 740})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert command.end()[0] == 0
+
+
 def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
     with live("paper_room", "--paused", out=tmp_path) as command:
         page.goto(command.url)
