@@ -1,7 +1,7 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
 # live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (the library for a core), images.mk (images
 # for boards, sizes), rtos.mk (the robot on FreeRTOS), lint.mk (style), bench.mk (instruction counts), docs.mk
-# (generated documents), fuzz.mk, mcdc.mk, soak.mk and mutants.mk (longer proofs).
+# (generated documents), package.mk (wheel, hashes), fuzz.mk, mcdc.mk, soak.mk and mutants.mk (longer proofs).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -20,6 +20,7 @@ include mk/bench.mk
 include mk/docs.mk
 include mk/playground.mk
 include mk/site.mk
+include mk/package.mk
 include mk/fuzz.mk
 include mk/mcdc.mk
 include mk/soak.mk

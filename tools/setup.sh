@@ -152,14 +152,14 @@ make_venv() {
 }
 
 install_run_packages() {
-    echo "setup: installing requirements.txt into $venv"
-    pip_install -r requirements.txt
+    echo "setup: installing requirements.txt into $venv, and building the extensions"
+    pip_install --require-hashes -r requirements.lock.txt
     pip_install --no-deps --no-build-isolation --editable .
 }
 
 install_test_packages() {
     echo "setup: installing requirements-test.txt into $venv"
-    pip_install -r requirements-test.txt
+    pip_install --require-hashes -r requirements-test.lock.txt
 }
 
 case $part in
@@ -168,5 +168,5 @@ case $part in
 esac
 install_missing
 make_venv
-once run.stamp requirements.txt pyproject.toml -- install_run_packages
-[[ $part == run ]] || once test.stamp requirements-test.txt -- install_test_packages
+once run.stamp requirements.lock.txt pyproject.toml -- install_run_packages
+[[ $part == run ]] || once test.stamp requirements-test.lock.txt -- install_test_packages
