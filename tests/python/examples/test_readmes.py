@@ -14,7 +14,8 @@ TOLERANCE = 0.05
 
 
 def code_files(example: str) -> list[Path]:
-    return [path for path in (EXAMPLES / example).rglob("*") if path.suffix in CODE]
+    found = (EXAMPLES / example).rglob("*")
+    return [path for path in found if path.suffix in CODE and "build" not in path.parts]
 
 
 def figures_of(text: str) -> tuple[int, int]:
