@@ -81,7 +81,7 @@ def test_topics_of_a_recording_are_all_listed():
 
 
 def test_what_a_trace_has_is_listed():
-    assert column(section(PYTHON, "A drive")) <= {one.name for one in fields(Trace)}
+    assert column(section(PYTHON, "A trace")) <= {one.name for one in fields(Trace)}
 
 
 def test_methods_exist():

@@ -13,18 +13,23 @@ PLUGIN, DETECTOR = read("docs/PLUGIN.md"), read("docs/DETECTOR.md")
 HEADERS = "".join(path.read_text(encoding="utf-8") for path in FIRMWARE.rglob("*.h"))
 
 
-def test_forty_lines_are_an_algorithm_that_works(tmp_path, monkeypatch, capsys):
+def test_fifty_lines_are_an_algorithm_that_works(tmp_path, monkeypatch):
+    """On two of the twenty drives; on the second one without cross-covariance it got lost."""
     source = block(PLUGIN, "python")
-    code = [line for line in source.splitlines() if line.strip()]
-    assert len(code) <= 45, "forty lines, give or take the imports"
+    assert len([line for line in source.splitlines() if line.strip()]) <= 50
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_slam.py").write_text(source)
-    words = re.search(r"bslam (compare .* --with my_slam:MySlam)$", PLUGIN, re.MULTILINE)[1].split()
-    assert main([*words, "--only", "bslam,dead_reckoning", "--jobs", "2"]) == 0
+    commands = re.findall(r"bslam (compare .* --with my_slam:MySlam.*)$", PLUGIN, re.MULTILINE)
+    words = (
+        commands[1].replace("--only bslam --seeds 0:20", "--only bslam,dead_reckoning --seeds 0:2").split()
+    )
+    assert words[: len(commands[0].split())] == commands[0].split()
+    assert main([*words, "--jobs", "2"]) == 0
     table = json.loads((tmp_path / "out" / "compare" / "compare.json").read_text())["methods"]
     error_m = {line["method"]: line["position_error_mean_m"] for line in table}
-    assert error_m["MySlam"] < 0.15
-    assert error_m["bslam"] < error_m["MySlam"] < error_m["dead_reckoning"]
+    assert error_m["bslam"] < error_m["MySlam"] < 0.08 < error_m["dead_reckoning"]
+    runs = json.loads((tmp_path / "out" / "compare" / "summary.json").read_text())["runs"]
+    assert all(one["nees_mean"] < 8.0 for one in runs if "MySlam" in one["name"])
 
 
 def test_algorithms_that_come_along_are_all_listed():
