@@ -71,6 +71,7 @@ function backToRoom() {
     page.shown = page.roomChoices = null;
     setMode(false);
     show();
+    wake();
 }
 
 function setMode(isLog) {

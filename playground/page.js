@@ -26,6 +26,7 @@ const page = {
     newestRun: null, // of a log
     isPlaying: true,
     held: new Set(),
+    isAwake: false, // steps are taken as time goes by
     lastMs: 0,
     owedSteps: 0,
 };
@@ -72,16 +73,27 @@ function command() {
     return { forward: sum(0), turn: sum(1) };
 }
 
+/** Goes on with the drive, unless it goes already or stands still. */
+function wake() {
+    if (!page.isAwake) {
+        page.isAwake = true;
+        page.lastMs = performance.now();
+        requestAnimationFrame(tick);
+    }
+}
+
 function tick(nowMs) {
-    const elapsedMs = Math.min(nowMs - page.lastMs, 100);
+    page.isAwake = page.isPlaying && !page.shown;
+    if (!page.isAwake) {
+        return;
+    }
+    const elapsedMs = Math.min(Math.max(nowMs - page.lastMs, 0), 100);
     page.lastMs = nowMs;
-    if (page.isPlaying && !page.shown) {
-        page.owedSteps += (1e3 * elapsedMs * Number(element("speed").value)) / STEP_US;
-        const steps = Math.min(Math.floor(page.owedSteps), STEPS_A_PICTURE);
-        page.owedSteps = steps === STEPS_A_PICTURE ? 0 : page.owedSteps - steps;
-        if (steps > 0) {
-            takeSteps(steps);
-        }
+    page.owedSteps += (1e3 * elapsedMs * Number(element("speed").value)) / STEP_US;
+    const steps = Math.min(Math.floor(page.owedSteps), STEPS_A_PICTURE);
+    page.owedSteps = steps === STEPS_A_PICTURE ? 0 : page.owedSteps - steps;
+    if (steps > 0) {
+        takeSteps(steps);
     }
     requestAnimationFrame(tick);
 }
@@ -183,6 +195,7 @@ function centimetres(metres) {
 function setPlaying(isPlaying) {
     page.isPlaying = isPlaying;
     element("pause").textContent = isPlaying ? "Pause" : "Go on";
+    wake();
 }
 
 function hold(key) {
@@ -258,7 +271,7 @@ function begin() {
     bind();
     bindFiles();
     restart();
-    requestAnimationFrame(tick);
+    wake();
 }
 
 begin();

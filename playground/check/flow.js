@@ -61,8 +61,21 @@ class CheckedDrive {
         return this.ids.length > 0 && this.timeS.length > 2 && extent(this.seenS) > 0;
     }
 
-    sumsAt(timeS) {
-        return [interpolated(timeS, this.timeS, this.wayM), interpolated(timeS, this.timeS, this.turnRad)];
+    /** Way and turn up to the moment of each sighting, which come in order of time, less a delay. */
+    sumsAt(delayS) {
+        const [way, turn] = [new Float64Array(this.seenS.length), new Float64Array(this.seenS.length)];
+        const last = this.timeS.length - 1;
+        let after = 1;
+        this.seenS.forEach((seenS, row) => {
+            while (after < last && this.timeS[after] < seenS - delayS) {
+                after++;
+            }
+            const step = this.timeS[after] - this.timeS[after - 1];
+            const share = Math.min(Math.max((seenS - delayS - this.timeS[after - 1]) / step, 0), 1);
+            way[row] = between(this.wayM, after, share);
+            turn[row] = between(this.turnRad, after, share);
+        });
+        return { way, turn };
     }
 
     /** The usual speed while it drives. */
@@ -88,8 +101,8 @@ function toldDelayUs(log) {
 /** The flow at the delay that explains most; null where too few beacons are seen again soon. */
 function bestFlow(drive) {
     const pairs = sightingPairs(drive);
-    const sums = drive.seenS.map((time) => drive.sumsAt(time));
-    const moves = sums.some(([way, turn]) => way !== sums[0][0] || turn !== sums[0][1]);
+    const { way, turn } = drive.sumsAt(0);
+    const moves = way.some((one, row) => one !== way[0] || turn[row] !== turn[0]);
     if (pairs.length < PAIRS_MIN || !moves) {
         return null;
     }
@@ -126,11 +139,10 @@ function flowAt(drive, pairs, delayS) {
     const bearings = { byWay: [], byTurn: [], change: [] };
     const ranges = { byWay: [], byTurn: [], change: [] };
     const turned = [];
+    const sums = drive.sumsAt(delayS);
     const { sensor_x_m: x, sensor_y_m: y } = drive.robot;
     for (const [i, j] of pairs) {
-        const before = drive.sumsAt(drive.seenS[i] - delayS);
-        const after = drive.sumsAt(drive.seenS[j] - delayS);
-        const [way, turn] = [after[0] - before[0], after[1] - before[1]];
+        const [way, turn] = [sums.way[j] - sums.way[i], sums.turn[j] - sums.turn[i]];
         const shift = wrapRad(drive.bearing[j] - drive.bearing[i]);
         const middle = drive.bearing[i] + 0.5 * shift;
         const [cos, sin] = [Math.cos(middle), Math.sin(middle)];

@@ -15,14 +15,9 @@ function searchSorted(values, value) {
     return low;
 }
 
-/** The value at `x` on the line through points (xs, ys); beyond its ends, as at them. */
-function interpolated(x, xs, ys) {
-    const after = Math.min(Math.max(searchSorted(xs, x), 1), xs.length - 1);
-    if (xs.length === 1 || x <= xs[0]) {
-        return ys[0];
-    }
-    const share = Math.min((x - xs[after - 1]) / (xs[after] - xs[after - 1]), 1);
-    return ys[after - 1] + share * (ys[after] - ys[after - 1]);
+/** The value at this share of the way to the place `after`. */
+function between(values, after, share) {
+    return values[after - 1] + share * (values[after] - values[after - 1]);
 }
 
 /** The true pose at a time; null where nobody knows it. theta may be NaN. */
@@ -34,17 +29,20 @@ function truthAt(truth, timeUs) {
     const toBefore = Math.abs(timeUs - stamps[before]);
     const toAfter = Math.abs(timeUs - stamps[after]);
     if (isInside && stamps[after] - stamps[before] <= INTERPOLATE_US && after > before) {
-        return between(truth, before, after, toBefore / (stamps[after] - stamps[before]));
+        return poseBetween(truth, after, toBefore / (stamps[after] - stamps[before]));
     }
     const row = toBefore <= toAfter ? before : after;
     const isNear = Math.min(toBefore, toAfter) <= NEAR_US;
     return isNear ? { x: truth.x[row], y: truth.y[row], theta: truth.theta[row] } : null;
 }
 
-function between(truth, a, b, share) {
-    const mixed = (column) => column[a] + share * (column[b] - column[a]);
-    const turn = wrapRad(truth.theta[b] - truth.theta[a]);
-    return { x: mixed(truth.x), y: mixed(truth.y), theta: wrapRad(truth.theta[a] + share * turn) };
+function poseBetween(truth, after, share) {
+    const turn = wrapRad(truth.theta[after] - truth.theta[after - 1]);
+    return {
+        x: between(truth.x, after, share),
+        y: between(truth.y, after, share),
+        theta: wrapRad(truth.theta[after - 1] + share * turn),
+    };
 }
 
 /** Times of the start and of the end of each step. */
