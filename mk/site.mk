@@ -16,3 +16,7 @@ $(SITE_STAMP): requirements-site.txt
 	@python3 -m venv $(SITE_VENV)
 	@$(SITE_VENV)/bin/pip install --quiet --requirement requirements-site.txt
 	@touch $@
+
+.PHONY: lint-ci
+lint-ci: ## what a public CI would do, read by its linter (needs Go)
+	@go run github.com/rhysd/actionlint/cmd/actionlint@v1.7.7 .github/workflows/*.yml

@@ -18,6 +18,7 @@ LINK = re.compile(r"\]\((?!\w+:|#)([^)#\s]+)")
 CODE = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
 MATHS = re.compile(r"^\$\$\n(.*?)\n\$\$$|\$([^$\n]+)\$", re.MULTILINE | re.DOTALL)
 FENCED_MATHS = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+QUOTED_LIST = re.compile(r"^(> (?!- ).*)\n(?=> - )", re.MULTILINE)  # begins a paragraph to mkdocs
 UNKNOWN_TEX = {r"\cr": r"\\", "{gathered}": "{matrix}", r"\arg": r"\mathrm{arg}"}  # of latex2mathml
 
 
@@ -120,7 +121,7 @@ def main(folder: Path) -> int:
     written["gallery.md"] = ("gallery.md", gallery({path: text for path, (_, text) in written.items()}))
     places = {path: place for path, (place, _) in written.items()}
     for path, (place, text) in written.items():
-        text, files = linked(path, text, places)
+        text, files = linked(path, QUOTED_LIST.sub(r"\1\n>\n", text), places)
         for file in (folder / name for name in (place, *files.values())):
             file.parent.mkdir(parents=True, exist_ok=True)
         (folder / place).write_text(with_maths(text) + "\n", encoding="utf-8")
