@@ -63,8 +63,9 @@ static volatile uint8_t received_count;
 
 void usart2_interrupt(void)  // in startup.s
 {
+    const uint32_t status = REGISTER(USART2);  // reading the it first ends an overrun
     received[received_count] = (char)REGISTER(USART2 + 0x04);
-    received_count++;
+    received_count += status >> 5 & 1;  // there was a byte
 }
 
 static void board_write(const char *text)

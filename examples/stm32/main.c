@@ -14,11 +14,11 @@ static int refused;    // readings and sightings that it did not take: bslam_sta
 static void take_sighting(const char *line)
 {
     int age_ms = 0, tag = 0, mrad = 0, mm = 0;
-    char end = 0;
-    const int read = sscanf(line, "%d %d %d %d%c", &age_ms, &tag, &mrad, &mm, &end);
+    char end[2];
+    const bool is_whole = sscanf(line, "%d %d %d %d%1[\r\n]", &age_ms, &tag, &mrad, &mm, end) == 5;
     const bslam_sighting_t seen = {
         .label = tag, .bearing_rad = 1e-3f * mrad, .range_m = 1e-3f * mm, .has_range = true};
-    const bool is_whole = read == 5 && end == '\n';  // else it is noise on the line
+    // What is not whole is noise on the line.
     refused += !is_whole || bslam_sightings(&robot, board_time_us() - 1000LL * age_ms, &seen, 1) != BSLAM_OK;
 }
 

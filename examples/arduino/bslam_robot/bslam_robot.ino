@@ -8,15 +8,19 @@ const float WHEELBASE_M = 0.2f, WHEEL_RADIUS_M = 0.033f, CAMERA_AHEAD_M = 0.05f;
 const int TICKS_PER_REVOLUTION = 1440;  // edges of channel A in a turn of the wheel
 const int64_t STEP_US = 40000;
 
-static bslam_t robot;              // all the memory that the filter has
-static unsigned refused = 0;       // readings and sightings that it did not take: bslam_status_name says why
+static bslam_t robot;         // all the memory that the filter has
+static unsigned refused = 0;  // readings and sightings that it did not take: bslam_status_name says why
 static volatile uint32_t left_ticks = 0, right_ticks = 0;
 
-static void left_edge() {
+#ifndef IRAM_ATTR  // on an ESP32: code of interrupts, which must not wait for flash
+#define IRAM_ATTR
+#endif
+
+static void IRAM_ATTR left_edge() {
   left_ticks += digitalRead(LEFT_A) == digitalRead(LEFT_B) ? -1 : 1;
 }
 
-static void right_edge() {
+static void IRAM_ATTR right_edge() {
   right_ticks += digitalRead(RIGHT_A) == digitalRead(RIGHT_B) ? -1 : 1;
 }
 
@@ -29,7 +33,7 @@ static int64_t now_us() {
 
 void setup() {
   Serial.begin(115200);
-  Serial1.begin(115200);
+  Serial1.begin(115200);  // on an ESP32 with its pins: Serial1.begin(115200, SERIAL_8N1, RX, TX)
   const int pins[] = {LEFT_A, LEFT_B, RIGHT_A, RIGHT_B};
   for (int pin : pins) {
     pinMode(pin, INPUT_PULLUP);

@@ -15,7 +15,7 @@ TOLERANCE = 0.05
 
 def code_files(example: str) -> list[Path]:
     found = (EXAMPLES / example).rglob("*")
-    return [path for path in found if path.suffix in CODE and "build" not in path.parts]
+    return [path for path in found if path.suffix in CODE and "build" not in path.relative_to(EXAMPLES).parts]
 
 
 def figures_of(text: str) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 // A made-up drive for the examples' robots: a circle of 0.8 m at 0.3 m/s among five tags, a left wheel that
-// slips by one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second.
+// slips by one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second,
+// in lines that end either way.
 #ifndef DRIVE_H
 #define DRIVE_H
 
@@ -40,8 +41,9 @@ static inline int drive_lines(int64_t time_us, char *text, size_t room)
         const double dy = drive_tags[i][1] - pose[1] - 0.05 * sin(pose[2]);
         const double bearing_rad = remainder(atan2(dy, dx) - pose[2], 2.0 * 3.14159265358979);
         if (fabs(bearing_rad) < 0.6) {
-            length += snprintf(text + length, room - (size_t)length, "%d %d %d %d\n", AGE_US / 1000, i + 1,
-                               (int)lround(1e3 * bearing_rad), (int)lround(1e3 * hypot(dx, dy)));
+            length += snprintf(text + length, room - (size_t)length, "%d %d %d %d%s", AGE_US / 1000, i + 1,
+                               (int)lround(1e3 * bearing_rad), (int)lround(1e3 * hypot(dx, dy)),
+                               i % 2 == 0 ? "\n" : "\r\n");
         }
     }
     return length;
