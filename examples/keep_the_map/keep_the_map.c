@@ -8,6 +8,7 @@
 #include "bslam/bslam.h"
 
 static bslam_t robot;
+static const char *const states[] = {"following", "doubting", "lost"};  // bslam_recovery_state_t
 
 // ---- the room, in place of your robot's sensors: a circle of 1 m among five tags, a left wheel that slips
 // -----
@@ -98,13 +99,14 @@ int main(int argc, char **argv)
     }
     const int64_t start_us = has_map ? 7000000 : 0;  // elsewhere on the circle
     bslam_recovery_state_t before = bslam_health(&robot).state;
+    printf("at the start: %s\n", states[before]);
     for (int64_t time_us = start_us + 40000; time_us <= start_us + 30000000; time_us += 40000) {
         const bslam_status_t status = drive_a_step(time_us);
         const bslam_recovery_state_t state = bslam_health(&robot).state;
         if (status != BSLAM_OK) {
             printf("%s\n", bslam_status_name(status));
         } else if (state != before) {
-            printf("after %.2f s: found\n", 1e-6 * (double)(time_us - start_us));
+            printf("after %.2f s: %s\n", 1e-6 * (double)(time_us - start_us), states[state]);
         }
         before = state;
     }

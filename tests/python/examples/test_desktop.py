@@ -104,13 +104,17 @@ def errors_of(printed: str) -> tuple[float, float]:
 
 def test_keep_the_map_saves_loads_and_finds_itself(tmp_path: Path, keep_the_map: Path) -> None:
     first = run(keep_the_map, folder=tmp_path).stdout
-    assert "found" not in first and re.search(r"room.bslam: saved, 5 beacons, \d+ bytes", first)
+    assert "at the start: following" in first and "after" not in first
+    assert re.search(r"room.bslam: saved, 5 beacons, \d+ bytes", first)
     kept = (tmp_path / "room.bslam").read_bytes()
+    readme = (EXAMPLES / "keep_the_map/README.md").read_text(encoding="utf-8")
     assert kept.startswith(b"BSLM") and not (tmp_path / "room.bslam.new").exists()
     for _ in range(2):
         again = run(keep_the_map, folder=tmp_path).stdout
         assert again.startswith("room.bslam: BSLAM_OK")
-        found = re.search(r"after (\d+\.\d+) s: found", again)
+        assert f"```text\n{again}```" in readme
+        assert "at the start: lost" in again
+        found = re.search(r"after (\d+\.\d+) s: following", again)
         assert found is not None and float(found[1]) < 10
         position_m, heading_rad = errors_of(again)
         assert position_m < 0.05 and heading_rad < 0.05
