@@ -1,5 +1,6 @@
 """What the tests of examples/ share: the library for this computer, programs, and what a README says."""
 
+import math
 import os
 import re
 import subprocess
@@ -57,7 +58,5 @@ def build_as_its_readme_says(example: str, library: Path, folder: Path) -> Path:
 
 def drive_end(seconds: float) -> tuple[float, float, float]:
     """Where the drive of stubs/drive.h is then."""
-    import math
-
     turned_rad = 0.3 / 0.8 * seconds
     return 0.8 * math.sin(turned_rad), 0.8 * (1 - math.cos(turned_rad)), turned_rad
