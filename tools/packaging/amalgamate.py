@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-from tools.packaging.places import ROOT, PackagingError, replace_folder, tracked
+from tools.packaging.places import ROOT, PackagingError, tracked, write_files
 
 HEADER = "bslam/bslam.h"
 INCLUDE = re.compile(r'^#include "(.+)"\n', re.MULTILINE)
@@ -103,7 +103,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("out/amalgamation"), help="the folder")
     options = parser.parse_args(argv)
     try:
-        replace_folder(options.out, amalgamated(options.root))
+        write_files(options.out, amalgamated(options.root))
     except (PackagingError, OSError) as error:
         print(f"amalgamate: {error}", file=sys.stderr)
         return 2

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from tools.checks import check_version
 from tools.packaging.amalgamate import amalgamated
-from tools.packaging.places import ROOT, PackagingError, replace_folder, tracked
+from tools.packaging.places import ROOT, PackagingError, tracked, write_files
 
 Files = dict[str, bytes]
 LIBRARIES = ("base", "bslam", "vision", "link")
@@ -125,7 +125,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     try:
         made = packages(options.root)
-        replace_folder(options.out, made)
+        write_files(options.out, made)
     except (PackagingError, OSError) as error:
         print(f"packages: {error}", file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""Where packages come from, files that git tracks, and go to: a folder that is there whole or not at all."""
+"""Where packages come from, files that git tracks, and how they get into a folder: all or none."""
 
 import subprocess
 import tempfile
@@ -24,14 +24,14 @@ def tracked(root: Path, *folders: str) -> list[str]:
     return names
 
 
-def replace_folder(folder: Path, files: dict[str, bytes]) -> None:
-    """Puts a folder of exactly these files in the place of what is there, at once."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as beside:
-        new, old = Path(beside, "new"), Path(beside, "old")
+def write_files(folder: Path, files: dict[str, bytes]) -> None:
+    """Puts files into a folder once all of them are written; others in it stay."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in files:
+        if (folder / name).is_dir():
+            raise PackagingError(f"{folder / name} is a folder")
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".") as unfinished:
         for name, content in files.items():
-            (new / name).parent.mkdir(parents=True, exist_ok=True)
-            (new / name).write_bytes(content)
-        if folder.exists():
-            folder.rename(old)
-        new.rename(folder)
+            Path(unfinished, name).write_bytes(content)
+        for name in files:
+            Path(unfinished, name).replace(folder / name)

@@ -237,10 +237,10 @@ def arduino_objects(cli: str, library: Path, work: Path) -> int:
 
 
 CHECKS: dict[str, tuple[str, Callable[[Path, Path], str]]] = {
-    "PlatformIO": ("platformio", platformio),
-    "ESP-IDF": ("esp-idf", esp_idf),
+    "PlatformIO": ("bslam-platformio-{}.tar.gz", platformio),
+    "ESP-IDF": ("bslam-esp-idf-{}.tar.gz", esp_idf),
     "Zephyr": ("", zephyr),
-    "Arduino": ("arduino", arduino),
+    "Arduino": ("bslam-arduino-{}.zip", arduino),
 }
 
 
@@ -250,11 +250,12 @@ def main() -> int:
     )
     parser.add_argument("packages", type=Path, help="the folder that `make packages` wrote")
     folder: Path = parser.parse_args().packages.resolve()
+    number = json.loads((ROOT / "library.json").read_text(encoding="utf-8"))["version"]
     failed = False
     for name, (archive, check) in CHECKS.items():
         with tempfile.TemporaryDirectory() as work:
             try:
-                said = check(next(folder.glob(f"bslam-{archive}-*")), Path(work))
+                said = check(folder / archive.format(number), Path(work))
             except RefusedError as error:
                 said, failed = f"REFUSED: {error}", True
         print(f"{name}: {said}", flush=True)

@@ -360,6 +360,36 @@ def test_a_header_that_is_not_there_is_named() -> None:
         amalgamate.amalgamate({"bslam/bslam.h": '#include "base/lost.h"\n'})
 
 
+@pytest.mark.parametrize("taken", ["bslam.c", "."])
+def test_what_cannot_be_written_is_one_line(
+    taken: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    if taken == ".":
+        out.touch()
+    else:
+        (out / taken).mkdir(parents=True)
+    assert amalgamate.main(["--out", str(out)]) == 2
+    assert re.fullmatch(r"amalgamate: .*out.*\n", capsys.readouterr().err)
+    assert len(list(tmp_path.rglob("*"))) == (1 if taken == "." else 2)
+
+
+def test_page_names_what_there_is(packed: packages.Files) -> None:
+    page = (ROOT / "docs" / "PACKAGES.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\b(?:CONFIG_)?(BSLAM_\w+)", page)) - {"BSLAM_SIZES", "BSLAM_E_SIZE"}
+    assert named and named <= set(header_sizes())
+    for pattern in re.findall(r"out/packages/([\w*.-]+)", page):
+        assert any(Path(name).match(pattern) for name in packed), pattern
+    for header in re.findall(r"<(bslam\w*\.h)>", page):
+        assert (ROOT / packages.ARDUINO / "src" / header).is_file()
+    targets = re.findall(
+        r"^([\w-]+):", (ROOT / "mk" / "packages.mk").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert {"packages", "amalgamation", "check-packages"} <= set(re.findall(r"make ([\w-]+)", page)) & set(
+        targets
+    )
+
+
 # ---- nothing half written ----------------------------------------------------------------------------------
 
 
@@ -379,7 +409,7 @@ def repository(tmp_path: Path) -> Path:
 
 
 def refused(repository: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What it says; what was there stays, and nothing stands beside it."""
+    """What it says; nothing is written."""
     out.mkdir(parents=True)
     (out / "older").touch()
     assert packages.main(["--root", str(repository), "--out", str(out)]) == 2
@@ -387,7 +417,7 @@ def refused(repository: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> 
     return capsys.readouterr().err
 
 
-def test_packages_replace_older_ones_and_leave_out_what_git_does_not_track(
+def test_packages_leave_other_files_alone_and_leave_out_what_git_does_not_track(
     repository: Path, tmp_path: Path, packed: packages.Files
 ) -> None:
     (repository / "firmware/bslam/draft.c").write_text("int draft;\n", encoding="utf-8")
@@ -395,7 +425,7 @@ def test_packages_replace_older_ones_and_leave_out_what_git_does_not_track(
     out.mkdir(parents=True)
     (out / "older").touch()
     assert packages.main(["--root", str(repository), "--out", str(out)]) == 0
-    assert sorted(path.name for path in out.parent.rglob("*")) == sorted([*packed, "packages"])
+    assert sorted(path.name for path in out.parent.rglob("*")) == sorted([*packed, "older", "packages"])
     name = f"bslam-platformio-{VERSION}.tar.gz"
     assert (out / name).read_bytes() == packed[name]
 
