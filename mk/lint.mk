@@ -35,8 +35,8 @@ $(TIDY_STAMPS): build/tidy/%.ok: %.c $(CORE_HEADERS) $(CAMERA_HEADERS) .clang-ti
 	@touch $@
 
 lint-python:
-	@$(PYTHON) -m ruff check --quiet --output-format=concise $(PYTHON_DIRS)
-	@$(PYTHON) -m ruff format --check --quiet $(PYTHON_DIRS)
+	@$(PYTHON) -m ruff check --quiet --output-format=concise $(PYTHON_DIRS) notebooks
+	@$(PYTHON) -m ruff format --check --quiet $(PYTHON_DIRS) notebooks
 
 lint-types:
 	@$(PYTHON) -m mypy --no-error-summary
@@ -58,5 +58,5 @@ lint-limits:
 .PHONY: format
 format: ## rewrite C and Python files in the house format
 	$(VENV)/bin/clang-format -i $(C_FILES)
-	$(PYTHON) -m ruff check --fix-only --quiet $(PYTHON_DIRS)
-	$(PYTHON) -m ruff format $(PYTHON_DIRS)
+	$(PYTHON) -m ruff check --fix-only --quiet $(PYTHON_DIRS) notebooks
+	$(PYTHON) -m ruff format $(PYTHON_DIRS) notebooks

@@ -8,6 +8,7 @@ from numbers import Real
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 
@@ -70,7 +71,7 @@ def refused_field(row: Row) -> str:
     return "signature: allowed are finite numbers"
 
 
-def frame_rows(where: str, **columns: Sequence[Any] | None) -> list[Row]:
+def frame_rows(where: str, **columns: Sequence[Any] | NDArray[Any] | None) -> list[Row]:
     """Sightings from the columns of a frame; what is None counts as 0 throughout.
 
     Raises BslamError for columns that are no lists, or of unequal length. The numbers themselves are looked

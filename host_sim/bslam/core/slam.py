@@ -37,6 +37,10 @@ _CONTRADICTIONS = {
 }
 
 
+Column = Sequence[float] | NDArray[Any]
+"""A number (or True, False) of each sighting: a list, or an array (n,) of any kind of number."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One setting of the C library. group: "settings", "expert" or "tuning"."""
@@ -247,18 +251,21 @@ class Slam:
     def sightings(
         self,
         time_us: int,
-        bearing_rad: Sequence[float],
-        range_m: Sequence[float],
-        label: Sequence[int],
-        mappable: Sequence[bool],
-        bearing_sd_rad: Sequence[float] | None = None,
-        range_sd_m: Sequence[float] | None = None,
-        range_scale_sd: Sequence[float] | None = None,
+        bearing_rad: Column,
+        range_m: Column,
+        label: Column,
+        mappable: Column,
+        bearing_sd_rad: Column | None = None,
+        range_sd_m: Column | None = None,
+        range_scale_sd: Column | None = None,
         signature: NDArray[np.float32] | None = None,
-        beacon_class: Sequence[int] | None = None,
-        score: Sequence[float] | None = None,
+        beacon_class: Column | None = None,
+        score: Column | None = None,
     ) -> list[Account]:
-        """One image: equal lengths; range NaN: direction only; label -1: no identity.
+        """One image of n sightings: columns of n values each.
+
+        time_us: when it was taken. bearing_rad: from the sensor's forward axis, left positive. range_m: NaN:
+        direction only. label: whose it is; -1: no identity. mappable: False: a moving thing.
 
         The noise as the detector gives it, and by what part all distances of a thing err alike; 0, or none at
         all: as the parameters have it. signature (m, 71): how each looks; None: nobody knows.
