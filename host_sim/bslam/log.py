@@ -418,7 +418,7 @@ _COLUMNS = {
     GYRO_SD: Column("0 or a number from 1e-6 to 100", lambda v: (v == 0.0) | ((v >= 1e-6) & (v <= 100.0))),
     BEACON_ID: IDENTITY,
     "bearing_rad": Column(
-        f"radians from -2 pi to 2 pi, which are degrees times pi/180; {_NO_RANGE_ALONE}",
+        "radians from -2 pi to 2 pi, which are degrees times pi/180",
         lambda values: np.abs(values) <= 2.0 * math.pi,
         why=_NO_RANGE_ALONE,
     ),

@@ -83,6 +83,11 @@ class RunOptions:
                 rule.convert(value, name)
         for preset in self.presets:
             ensure_word("preset", preset, PRESETS)
+        if self.frozen and self.kept_map is None:
+            raise BslamError("frozen: no map; allowed: with kept_map, the path of one")
+        if self.kept_map is not None and (self.known_map or self.recovery == "off"):
+            other = "known_map" if self.known_map else "recovery 'off'"
+            raise BslamError(f"kept_map {self.kept_map!r} with {other}; allowed: one of them")
 
     @property
     def association_name(self) -> str:

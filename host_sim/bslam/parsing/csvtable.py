@@ -24,8 +24,13 @@ class Column:
     allowed: str
     holds: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
     empty: float | None = None  # what an empty field stands for; None: a field must not be empty
-    why: str = ""  # it must be there
+    why: str = ""  # it must be there, and filled
     words: bool = False  # its fields are texts, which somebody else makes sense of
+
+    def error(self, origin: Origin, number: int, name: str, text: str) -> BslamError:
+        """That a field of a row is not allowed, and what is."""
+        why = f"; {self.why}" if self.why and not text else ""
+        return origin.error(number, name, text, self.allowed + why)
 
 
 def is_count(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -244,7 +249,7 @@ def _parse(origin: Origin, name: str, column: Column, texts: Sequence[str]) -> N
         values = np.array([float(text or "nan") for text in texts], dtype=np.float64)
     except ValueError:
         row = next(row for row, text in enumerate(texts) if not is_number(text or "nan"))
-        raise origin.error(row + origin.first, name, texts[row], column.allowed) from None
+        raise column.error(origin, row + origin.first, name, texts[row]) from None
     good = column.holds(values)
     if column.empty is not None:
         empty = np.array([text == "" for text in texts], dtype=np.bool_)
@@ -252,7 +257,7 @@ def _parse(origin: Origin, name: str, column: Column, texts: Sequence[str]) -> N
         good |= empty
     if not good.all():
         row = int(np.argmin(good))
-        raise origin.error(row + origin.first, name, texts[row], column.allowed)
+        raise column.error(origin, row + origin.first, name, texts[row])
     return values
 
 

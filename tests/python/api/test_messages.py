@@ -78,6 +78,8 @@ def test_a_misspelt_name_is_met_with_the_nearest(call, name) -> None:
         ),
         (lambda: DRIVE.run(seed=0.5), "seed: 0.5 is not allowed; allowed: an integer from 0"),
         (lambda: DRIVE.run(presets="paper"), "presets: 'paper' is not allowed; allowed: a tuple of names"),
+        (lambda: DRIVE.run(frozen=True), "frozen: no map; allowed: with kept_map"),
+        (lambda: DRIVE.run(kept_map="a.bslam", known_map=True), "with known_map; allowed: one of them"),
         (lambda: DRIVE.run(association="known:2"), "'2' is not a rate; allowed: known, known:RATE with"),
         (
             lambda: following().sightings(40_000, [0.1], [2.0, 3.0], [1], [True]),
