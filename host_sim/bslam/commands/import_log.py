@@ -27,7 +27,7 @@ BAG is a rosbag2 folder, FILE.mcap or FILE.db3; `pip install rosbags` brings wha
 Markers: AprilTagDetectionArray (apriltag_msgs, Isaac ROS), ArucoMarkers, ArucoDetection, MarkerArray
 (aruco_msgs), Detection3DArray, or /tf with frames such as tag36h11:5. A topic that is not named is the only
 one of its kind. Where the camera sits comes from /tf_static. Stamps are those of the headers.
---tags: {HELP}.
+--tags: {HELP}
 Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
 
 _LOG_FILES = ("odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml")

@@ -15,8 +15,8 @@ SIDE_M: Final = number(1e-3, 10.0)
 _SIDES: Final = Rule("a table, tag = side in metres", dict)
 _NAMED_MAX: Final = 8
 HELP: Final = (
-    'TOML: `default_m = 0.16` for all, and below `[side_m]` lines `5 = 0.2` or `"tag36h11:5" = 0.2`; '
-    "or csv with the columns id,side_m"
+    'TOML: `default_m = 0.16` for all, below `[side_m]` lines `5 = 0.2` or `"tag36h11:5" = 0.2`; '
+    "or csv: id,side_m"
 )
 
 
