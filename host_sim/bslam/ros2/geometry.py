@@ -187,8 +187,8 @@ def place_tags(rays: Floats, side_m: Floats, ray_sd: float) -> tuple[Floats, Flo
     """Centres (n, 3) of square tags in the optical frame, and their covariance (n, 3, 3).
 
     rays (n, 4, 2): x/z and y/z of each tag's corners, in order round it; side_m (n,); ray_sd: noise of each
-    ray's x and y. Least squares over the six degrees of freedom, started from the homography. NaN where
-    there is no solution in front of the camera.
+    ray's x and y. Least squares over the six degrees of freedom (Levenberg, Marquardt), started from the
+    homography. NaN where there is no solution in front of the camera.
     """
     rotation, place = _from_homography(rays, side_m)
     corners = np.concatenate([_SQUARE, np.zeros((4, 1))], axis=1) * side_m[:, np.newaxis, np.newaxis]
@@ -197,20 +197,19 @@ def place_tags(rays: Floats, side_m: Floats, ray_sd: float) -> tuple[Floats, Flo
     information = np.full((len(rays), 6, 6), np.nan)
     with np.errstate(all="ignore"):
         for _ in range(_FIT_STEPS):
-            seen, tags, turn, centre = rays[todo], corners[todo], rotation[todo], place[todo]
-            missed, slope = (one / ray_sd for one in _missed(seen, tags, turn, centre))
+            if not len(todo):
+                break
+            tags = rays[todo], corners[todo]
+            missed, slope = (one / ray_sd for one in _missed(*tags, rotation[todo], place[todo]))
             information[todo] = now = np.einsum("nki,nkj->nij", slope, slope) + hold
             damped = now * (1.0 + damping[todo, np.newaxis, np.newaxis] * np.eye(6))
             step = _solved(damped, np.einsum("nki,nk->ni", slope, missed))
-            next_turn, next_centre = _turned(step[:, :3]) @ turn, centre + step[:, 3:]
-            cost = np.square(_missed(seen, tags, next_turn, next_centre)[0] / ray_sd).sum(axis=1)
-            better = (cost <= np.square(missed).sum(axis=1)) & (next_centre[:, 2] > 0.0)
-            rotation[todo[better]], place[todo[better]] = next_turn[better], next_centre[better]
+            turned, moved = _turned(step[:, :3]) @ rotation[todo], place[todo] + step[:, 3:]
+            cost = np.square(_missed(*tags, turned, moved)[0] / ray_sd).sum(axis=1)
+            better = (cost <= np.square(missed).sum(axis=1)) & (moved[:, 2] > 0.0)
+            rotation[todo[better]], place[todo[better]] = turned[better], moved[better]
             damping[todo] *= np.where(better, 0.1, 10.0)
-            gain = np.einsum("ni,nij,nj->n", step, now, step)
-            todo = todo[~(gain < _FIT_WITHIN**2)]
-            if not len(todo):
-                break
+            todo = todo[~(np.einsum("ni,nij,nj->n", step, now, step) < _FIT_WITHIN**2)]
     good = np.isfinite(information).all(axis=(1, 2)) & (place[:, 2] > 0.0)
     place[~good], information[~good] = np.nan, np.eye(6)
     return place, np.linalg.inv(information)[:, 3:, 3:]

@@ -327,30 +327,34 @@ def _camera_pose(read: _Read, request: Request, frame: str, path: Path) -> Trans
 def _camera(read: _Read, request: Request, frames: Sequence[str], needed: bool) -> Camera | None:
     """The camera of these frames; None: it is neither known nor needed."""
     fit = [name for name, one in read.cameras.items() if one.header.frame_id in frames]
-    names = fit or list(read.cameras)
     if not needed:
         known = [camera_of(read.cameras[name], False) for name in fit]
         return known[0] if len(known) == 1 and known[0].fx > 0.0 else None
+    names = fit or list(read.cameras)
     if len(frames) > 1:
         raise BslamError(f"corners of several cameras ({', '.join(frames)}); allowed: a topic of one camera")
     if len(names) != 1:
         raise BslamError(f"--camera-info: allowed: one of {', '.join(names) or 'none with messages'}")
     camera = camera_of(read.cameras[names[0]], bool(request.rectified))
-    if request.rectified is None and camera.is_distorted:
+    _require_usable(camera, names[0], request.rectified)
+    return camera
+
+
+def _require_usable(camera: Camera, topic: str, rectified: bool | None) -> None:
+    if not (camera.fx > 0.0 and camera.fy > 0.0):
+        raise BslamError(f"{topic}: focal lengths {camera.fx:g}, {camera.fy:g}; allowed: a calibrated camera")
+    if not camera.is_distorted:
+        return
+    if rectified is None:
         raise BslamError(
-            f"{names[0]}: the camera distorts; allowed: --image rectified, if the detector read image_rect "
+            f"{topic}: the camera distorts; allowed: --image rectified, if the detector read image_rect "
             "(apriltag_ros does), or --image raw"
         )
-    if camera.model not in DISTORTIONS and camera.is_distorted:
+    if camera.model not in DISTORTIONS:
         raise BslamError(
-            f"{names[0]}: distortion model {camera.model!r}; allowed: {', '.join(DISTORTIONS[1:])}, or a "
+            f"{topic}: distortion model {camera.model!r}; allowed: {', '.join(DISTORTIONS[1:])}, or a "
             "detector on the rectified image and --image rectified"
         )
-    if not (camera.fx > 0.0 and camera.fy > 0.0):
-        raise BslamError(
-            f"{names[0]}: focal lengths {camera.fx:g}, {camera.fy:g}; allowed: a calibrated camera"
-        )
-    return camera
 
 
 def _within(sightings: Sightings, travel: Travel, chosen: _Chosen, notes: list[str]) -> Sightings:

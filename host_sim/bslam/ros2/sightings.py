@@ -151,14 +151,13 @@ def _table(texts: list[str], numbers: list[tuple[float, ...]]) -> tuple[Sighting
 def _numbered(texts: Sequence[str]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Numbers for identities; the words that they stand for, unless all are numbers of one family."""
     names = sorted({one for one in texts if one})
-    families = {one.rpartition(":")[0] for one in names}
-    tails = {one: one.rpartition(":")[2] for one in names}
-    plain = all(tail.isdecimal() and int(tail) <= BEACON_ID_MAX for tail in tails.values())
-    if plain and len(families) <= 1:
-        number, words = {one: int(tail) for one, tail in tails.items()}, ()
+    tails = [one.rpartition(":")[2] for one in names]
+    of_one_family = len({one.rpartition(":")[0] for one in names}) <= 1
+    if of_one_family and all(one.isdecimal() and int(one) <= BEACON_ID_MAX for one in tails):
+        number, words = dict(zip(names, map(int, tails), strict=True)), list[str]()
     else:
-        long = [one for one in names if len(one) > WORD_MAX or not one.isprintable()]
-        if long:
-            raise BslamError(f"marker {long[0]!r}: allowed: up to {WORD_MAX} printable characters")
-        number, words = {one: i for i, one in enumerate(names)}, tuple(names)  # type: ignore[assignment]
-    return np.array([number.get(one, -1) for one in texts], dtype=np.int64), words
+        number, words = {one: i for i, one in enumerate(names)}, names
+    for one in words:
+        if len(one) > WORD_MAX or not one.isprintable():
+            raise BslamError(f"marker {one!r}: allowed: up to {WORD_MAX} printable characters")
+    return np.array([number.get(one, -1) for one in texts], dtype=np.int64), tuple(words)

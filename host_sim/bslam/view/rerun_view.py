@@ -85,7 +85,7 @@ class Scene:
             stream.log("plots/sd_m", rr.Scalars([float(course.sd_m[row])]))
             if math.isfinite(course.error_m[row]):
                 stream.log("plots/error_m", rr.Scalars([float(course.error_m[row])]))
-        if rows == self._rows:
+        if rows == self._rows and moment.state != FINISHED:
             return
         self._rows = rows
         self._show_map(moment)

@@ -237,6 +237,12 @@ def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
         [*odometry, *((t + 10**12, n, k, m) for t, n, k, m in odometry), *aruco, *static],
         "runs back by 2.400 s",
     )
+    for camera, why in (
+        (replace(CAMERA, fx=0.0, distortion=()), "allowed: a calibrated camera"),
+        (replace(CAMERA, model="equidistant"), "the camera distorts"),
+    ):
+        lens = replace(start, camera=camera)
+        yield f"lens {why[-10:]}", [*odometry, *start.apriltags(), *static, *lens.camera_info()], why
     empty = "ros2_aruco_interfaces/msg/ArucoMarkers"
     none = [(EPOCH_NS, "/aruco_markers", empty, new(empty, header=header(EPOCH_NS)))]
     yield "never a marker", [*odometry, *none, *static], "hold no marker"
@@ -252,7 +258,7 @@ def test_bags_that_lack_something_are_one_line(
 ) -> None:
     for name, said, why in _broken(drive):
         bag = write_bag(tmp_path / name.replace(" ", "_"), said)
-        assert_refused(tmp_path, str(bag), why, capsys)
+        assert_refused(tmp_path, f"{bag} {'--tag-size 0.3' if name.startswith('lens') else ''}", why, capsys)
 
 
 def test_a_type_that_nobody_defines_is_named(
