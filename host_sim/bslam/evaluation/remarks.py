@@ -13,6 +13,7 @@ from bslam.options import RunOptions, core_params, presets_of
 MOSTLY: Final = 0.5  # of the inputs: more refused or gated than that, and the run says nothing of the robot
 _MANY: Final = 0.1
 _LISTED: Final = 5
+_FAR_M: Final = 100.0  # no camera or scanner of such a robot sees half of its beacons from farther
 _ODOMETRY_NOISE: Final = (
     *("left_speed_sd_mps", "right_speed_sd_mps", "travel_sd_per_sqrt_m", "forward_sd_per_sqrt_m"),
     *("forward_sd_per_sqrt_s", "turn_sd_per_sqrt_m", "turn_sd_per_sqrt_rad", "turn_sd_per_sqrt_s"),
@@ -24,14 +25,14 @@ def notes_on(log: Log, trace: Trace, options: RunOptions) -> list[str]:
     notes = list(log.notes)
     if options.sensor == "recorded":
         notes += _of_odometry(log, options) + _of_identities(log, options) + _of_truth(log) + _of_beacons(log)
+        notes += _of_ranges(log)
     refused = sum(trace.refusals.values())
     if refused:
         by_status = ", ".join(f"{name} {count}" for name, count in sorted(trace.refusals.items()))
         notes.append(f"{refused} of {_inputs(log)} inputs refused: {by_status}")
     counts = trace.counts
     if counts.rejected > _MANY * counts.sightings:
-        why = "; `bslam check` tells a log's slips" if options.sensor == "recorded" else ""
-        notes.append(f"{counts.rejected} of {counts.sightings} sightings gated{why}")
+        notes.append(f"{counts.rejected} of {counts.sightings} sightings gated{_how_to_know(options)}")
     return notes
 
 
@@ -44,7 +45,7 @@ def problems_of(log: Log, trace: Trace, options: RunOptions) -> list[str]:
     if refused > MOSTLY * inputs or unused > MOSTLY * counts.sightings:
         problems.append(
             f"most of the log was not used: {refused} of {inputs} inputs refused, {unused} of "
-            f"{counts.sightings} sightings gated or in refused frames"
+            f"{counts.sightings} sightings gated or in refused frames{_how_to_know(options)}"
         )
     without_room = trace.counters.get("map_full", 0)
     if without_room:
@@ -53,6 +54,17 @@ def problems_of(log: Log, trace: Trace, options: RunOptions) -> list[str]:
             "map closes no loop"
         )
     return problems
+
+
+def _how_to_know(options: RunOptions) -> str:
+    return "; `bslam check` tells a log's slips" if options.sensor == "recorded" else ""
+
+
+def _of_ranges(log: Log) -> list[str]:
+    range_m = log.sightings.range_m[np.isfinite(log.sightings.range_m)]
+    if len(range_m) == 0 or np.median(range_m) <= _FAR_M:
+        return []
+    return [f"half of the distances are above {_FAR_M:g} m: `bslam check` tells a log in millimetres"]
 
 
 def _inputs(log: Log) -> int:

@@ -168,11 +168,25 @@ def test_degrees_are_refused_by_the_reader_with_the_factor(capsys, tmp_path):
     assert "allowed: radians from -2 pi to 2 pi, which are degrees times pi/180" in line
 
 
-def test_gated_sightings_of_a_log_lead_to_the_check(capsys, tmp_path):
-    write_folder(with_sightings(LOG, bearing_rad=-LOG.sightings.bearing_rad), tmp_path / "log")
+@pytest.mark.parametrize(
+    ("slip", "said"),
+    [
+        (
+            lambda log: with_sightings(log, bearing_rad=-log.sightings.bearing_rad),
+            "sightings gated; `bslam check` tells a log's slips",
+        ),
+        (in_nanoseconds, "in refused frames; `bslam check` tells a log's slips"),
+        (
+            lambda log: with_sightings(log, range_m=1e3 * log.sightings.range_m),
+            "half of the distances are above 100 m: `bslam check` tells a log in millimetres",
+        ),
+    ],
+)
+def test_replay_of_a_log_with_a_slip_leads_to_the_check(slip, said, capsys, tmp_path):
+    write_folder(slip(LOG), tmp_path / "log")
     words = ["--pictures", "0", "--jobs", "1", "--out", str(tmp_path / "out")]
     main(["replay", "csv", str(tmp_path / "log"), *words])
-    assert "sightings gated; `bslam check` tells a log's slips" in "".join(capsys.readouterr())
+    assert said in "".join(capsys.readouterr())
 
 
 def message_of(call):
