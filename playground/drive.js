@@ -1,6 +1,7 @@
 "use strict";
 
 const PATH_POINTS_MAX = 6000;
+const KEPT_ROWS = 1500; // of errors, to be drawn: a minute
 const NEES_FIRST_STEP = 51; // by then the pose's covariance has left its start value of 0
 
 /** Points of a path; where they become too many, every other one goes. */
@@ -22,6 +23,25 @@ class Path {
     }
 }
 
+/** Mean of the numbers that are finite. */
+class Mean {
+    constructor() {
+        this.sum = 0;
+        this.count = 0;
+    }
+
+    add(value) {
+        if (Number.isFinite(value)) {
+            this.sum += value;
+            this.count += 1;
+        }
+    }
+
+    get value() {
+        return this.sum / this.count;
+    }
+}
+
 /** A simulated drive with the estimator beside it. */
 class Drive {
     constructor(choices) {
@@ -35,13 +55,15 @@ class Drive {
         };
         this.settings = coreSettings(this.estimator, log, { ...choices, recovery: true });
         this.estimator.begin(this.settings);
-        this.estimator.inputs = [];
+        this.estimator.inputs = choices.keepsInputs ? [] : null;
         this.ledger = new Ledger();
         this.truePath = new Path();
         this.path = new Path();
         this.odometryPath = new Path();
         this.odometryPose = { x: 0, y: 0, theta: 0 };
-        this.errors = []; // a row a step: time, error, NEES
+        this.errors = []; // a row a step of the last while: time, error, NEES
+        this.meanError = new Mean();
+        this.meanNees = new Mean();
         this.sightings = [];
         this.beacons = [];
         this.begin();
@@ -104,5 +126,10 @@ class Drive {
         const isEarly = this.world.step < NEES_FIRST_STEP;
         const nees = isEarly ? NaN : poseNees(this.pose, truth, this.choices.filter);
         this.errors.push([1e-6 * this.world.timeUs, error, nees]);
+        this.meanError.add(error);
+        this.meanNees.add(nees);
+        if (this.errors.length > 2 * KEPT_ROWS) {
+            this.errors = this.errors.slice(-KEPT_ROWS);
+        }
     }
 }

@@ -1,4 +1,5 @@
 "use strict";
+// Messages, and the numbers and names in them.
 
 /** What the page says instead of doing what was asked: what, where, what is allowed. */
 class PageError extends Error {}
@@ -39,4 +40,17 @@ function commonLetters(a, b) {
 /** A text in quotes, as Python prints it. */
 function quoted(text) {
     return text.includes("'") && !text.includes('"') ? `"${text}"` : `'${text.replaceAll("'", "\\'")}'`;
+}
+
+/** A number as C's %g has it. */
+function general(value, digits = 6) {
+    const [mantissa, exponent] = value
+        .toExponential(digits - 1)
+        .split("e")
+        .map(Number);
+    if (exponent < -4 || exponent >= digits) {
+        const sign = exponent < 0 ? "-" : "+";
+        return `${mantissa}e${sign}${String(Math.abs(exponent)).padStart(2, "0")}`;
+    }
+    return String(Number(value.toPrecision(digits)));
 }

@@ -111,6 +111,11 @@ function showLog({ checked, replay, result }) {
     showFindings(checked);
 }
 
+function meanOf(rows, column) {
+    const known = rows.map((row) => row[column]).filter(Number.isFinite);
+    return known.reduce((sum, value) => sum + value, 0) / known.length;
+}
+
 function thinned(rows) {
     const every = Math.ceil(rows.length / PLOT_ROWS_MAX) || 1;
     return rows.filter((_, row) => row % every === 0);

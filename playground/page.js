@@ -12,7 +12,6 @@ const KEYS = {
     KeyD: [0, -1],
 };
 const STEPS_A_PICTURE = 60; // a slow machine drives slower than asked, and stays usable
-const PLOT_S = 60;
 const TAP_MS = 400;
 const FIRST_STEPS = 25; // so that there is a map at once
 const NUMBERS = ["wheelNoise", "beacons", "seed", "fieldOfView"];
@@ -128,11 +127,7 @@ function showDrive(drive) {
         pose: drive.pose,
         truePose: drive.world.pose,
     });
-    const last = drive.errors.length ? drive.errors[drive.errors.length - 1][0] : 0;
-    drawPlots(
-        element("plots"),
-        drive.errors.filter((row) => row[0] > last - PLOT_S),
-    );
+    drawPlots(element("plots"), drive.errors.slice(-KEPT_ROWS));
     showFigures(driveFigures(drive));
     element("wheelNoiseText").textContent = `${drive.choices.wheelNoise.toFixed(2)} m/s`;
     element("beaconsText").textContent = String(drive.choices.beacons);
@@ -149,11 +144,8 @@ function driveFigures(drive) {
     return [
         ["time", `${(1e-6 * drive.world.timeUs).toFixed(1)} s`],
         ["robot is", drive.world.isSlipping ? `${health.state}, wheel slips` : health.state],
-        [
-            "error now, mean",
-            `${centimetres(lastOf(drive.errors, 1))}, ${centimetres(meanOf(drive.errors, 1))}`,
-        ],
-        ["mean NEES (3 is right)", meanOf(drive.errors, 2).toFixed(1)],
+        ["error now, mean", `${centimetres(lastOf(drive.errors, 1))}, ${centimetres(drive.meanError.value)}`],
+        ["mean NEES (3 is right)", drive.meanNees.value.toFixed(1)],
         ["beacons in the map, in the room", `${health.beacons}, ${drive.world.beacons.length}`],
         ["matches right, wrong", `${right}, ${wrong}`],
         ["sightings new, not used", `${started}, ${rejected}`],
@@ -179,11 +171,6 @@ function showFigures(rows) {
 
 function lastOf(rows, column) {
     return rows.length ? rows[rows.length - 1][column] : NaN;
-}
-
-function meanOf(rows, column) {
-    const known = rows.map((row) => row[column]).filter(Number.isFinite);
-    return known.reduce((sum, value) => sum + value, 0) / known.length;
 }
 
 function centimetres(metres) {
@@ -274,4 +261,9 @@ function begin() {
     wake();
 }
 
-begin();
+try {
+    begin();
+} catch (error) {
+    say(`This browser cannot run the estimator (WebAssembly): ${error.message}`);
+    throw error;
+}

@@ -13,19 +13,6 @@ const TIME_UNITS = [
 const DEGREES_SHARE = 0.1;
 const SAME_UNIT = 30; // an interval that is less than so many times off is of the same unit
 
-/** A number as C's %g has it. */
-function general(value, digits = 6) {
-    const [mantissa, exponent] = value
-        .toExponential(digits - 1)
-        .split("e")
-        .map(Number);
-    if (exponent < -4 || exponent >= digits) {
-        const sign = exponent < 0 ? "-" : "+";
-        return `${mantissa}e${sign}${String(Math.abs(exponent)).padStart(2, "0")}`;
-    }
-    return String(Number(value.toPrecision(digits)));
-}
-
 /** A file of rows with stamps, its fields as texts. */
 class RawTable {
     constructor(file, names, rows) {

@@ -20,7 +20,8 @@ const SIGHTING_OPTIONAL = [
     "beacon_class",
 ];
 const NO_RANGE_ALONE = "a sighting of range alone cannot be used";
-const IDENTITY_ALLOWED = `an integer from 0 to ${LABEL_MAX}, a word of up to ${WORD_MAX} printable characters`;
+const A_WORD = `a word of up to ${WORD_MAX} printable characters`;
+const IDENTITY_ALLOWED = `an integer from 0 to ${LABEL_MAX}, ${A_WORD}`;
 
 const isCount = (value) => value >= 0 && value <= 2 ** 53 && Math.floor(value) === value;
 const COUNT = { allowed: "an integer from 0 to 2^53", holds: isCount };
@@ -44,7 +45,7 @@ const COLUMN_RULES = {
     },
     beacon_id: { allowed: IDENTITY_ALLOWED, isWord: true },
     bearing_rad: {
-        allowed: `radians from -2 pi to 2 pi; ${NO_RANGE_ALONE}`,
+        allowed: `radians from -2 pi to 2 pi, which are degrees times pi/180; ${NO_RANGE_ALONE}`,
         holds: (value) => Math.abs(value) <= 2 * Math.PI,
         why: NO_RANGE_ALONE,
     },

@@ -4,7 +4,7 @@
 const TICK_KEYS = ["left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits"];
 
 const inRange = (low, high) => ({
-    allowed: `a number from ${low} to ${high}`,
+    allowed: `a number from ${general(low)} to ${general(high)}`,
     holds: (value) => typeof value === "number" && value >= low && value <= high,
 });
 const whole = (low, high) => ({

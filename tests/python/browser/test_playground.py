@@ -117,7 +117,7 @@ def driven(page: Page, steps: int, **choices) -> dict:
     """A drive with a slip and a carrying away, and all that went in and came out."""
     return page.evaluate(
         """([steps, choices]) => {
-            const drive = new Drive({ ...readChoices(), ...choices });
+            const drive = new Drive({ ...readChoices(), ...choices, keepsInputs: true });
             for (let step = 0; step < steps; step++) {
                 if (step === 100) drive.world.slip();
                 if (step === 200) drive.world.carryAway();
