@@ -104,8 +104,8 @@ class Drive {
     }
 
     /** To another place, which odometry does not see. */
-    carryAway() {
-        this.world.carryAway();
+    kidnap() {
+        this.world.kidnap();
         this.truePath.add({ x: NaN, y: NaN }); // no line leads there
     }
 

@@ -28,7 +28,10 @@ function bindFiles() {
 /** Checks a log and runs it. What is none is named, and the page stays as it is. */
 async function loadFiles(name, files) {
     await orSay(async () => {
-        const checked = await checkLog(name, await logTexts(files));
+        const texts = await logTexts(files);
+        say(`${name}: is checked`);
+        await breath();
+        const checked = await checkLog(name, texts);
         await runLog(checked, usualChoices(checked.log));
     });
 }

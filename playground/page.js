@@ -60,16 +60,12 @@ function command() {
     if (element("self").checked) {
         return null;
     }
-    const pairs = [...page.held].map((key) => KEYS[key]);
-    const sum = (place) =>
-        Math.max(
-            -1,
-            Math.min(
-                1,
-                pairs.reduce((total, pair) => total + pair[place], 0),
-            ),
-        );
-    return { forward: sum(0), turn: sum(1) };
+    const wanted = { forward: 0, turn: 0 };
+    for (const [forward, turn] of [...page.held].map((key) => KEYS[key])) {
+        wanted.forward += forward;
+        wanted.turn += turn;
+    }
+    return { forward: limited(wanted.forward), turn: limited(wanted.turn) };
 }
 
 /** Goes on with the drive, unless it goes already or stands still. */
@@ -240,7 +236,7 @@ function bind() {
     element("restart").addEventListener("click", restart);
     element("room").addEventListener("click", backToRoom);
     element("slip").addEventListener("click", () => page.drive.world.slip());
-    element("carry").addEventListener("click", () => page.drive.carryAway());
+    element("kidnap").addEventListener("click", () => page.drive.kidnap());
     for (const id of [...NUMBERS, ...WORDS]) {
         element(id).addEventListener("input", onChoice);
     }

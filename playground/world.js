@@ -71,7 +71,7 @@ class SelfDriver {
             };
         }
         const off = wrapRad(Math.atan2(this.goal.y - pose.y, this.goal.x - pose.x) - pose.theta);
-        const turn = Math.max(-1, Math.min(1, 1.6 * off));
+        const turn = limited(1.6 * off);
         return { forward: Math.abs(off) > 1 ? 0 : 1 - 0.5 * Math.abs(turn), turn };
     }
 }
@@ -134,7 +134,7 @@ class World {
     }
 
     /** To another place, without a turn of the wheels. */
-    carryAway() {
+    kidnap() {
         const from = this.pose;
         do {
             this.pose = {
@@ -175,6 +175,10 @@ class World {
         const rangeM = Math.max(range + sd * this.sensorRandom.normal(), 0.01);
         return { id, bearingRad, rangeM: this.hasRange ? rangeM : NaN };
     }
+}
+
+function limited(value) {
+    return Math.max(-1, Math.min(1, value));
 }
 
 /** `value` moved towards `goal` by at most `step`. */

@@ -116,7 +116,7 @@ function bestFlow(drive) {
 /** Sightings of one beacon, a lag apart. */
 function sightingPairs(drive) {
     const rowsOf = new Map();
-    drive.ids.forEach((id, row) => rowsOf.set(id, [...(rowsOf.get(id) || []), row]));
+    drive.ids.forEach((id, row) => (rowsOf.get(id) || rowsOf.set(id, []).get(id)).push(row));
     const pairs = [];
     for (const id of [...rowsOf.keys()].sort((a, b) => a - b)) {
         const rows = rowsOf.get(id);

@@ -43,6 +43,11 @@ function framesOf(log, choices) {
     return frames;
 }
 
+/** Lets the page be drawn. */
+function breath() {
+    return new Promise((resume) => setTimeout(resume));
+}
+
 class Replay {
     constructor(log, choices) {
         this.log = log;
@@ -74,7 +79,7 @@ class Replay {
         for (let row = first; row < timeUs.length; row++) {
             this.step(row, row === timeUs.length - 1);
             if (row % ROWS_AT_ONCE === 0) {
-                await new Promise((resume) => setTimeout(resume));
+                await breath();
             }
         }
         return this;
