@@ -1,6 +1,6 @@
 # The playground: the estimator in a browser tab, one file without a server. clang has WebAssembly as a target;
-# clang-19 is what the tests take already, lld-19 its linker: a third of a megabyte more, where wasi-libc and
-# Emscripten bring a C library of which five functions are needed (playground/libc).
+# clang-19 is what the tests take already, lld-19 its linker: 5 MB more, where wasi-libc and Emscripten bring a
+# C library of which five functions are needed (playground/libc).
 
 # All that the host's extensions of this size have (host_sim/bslam/core/build.py), so that fingerprints are the
 # same.
@@ -20,8 +20,10 @@ playground: out/playground/index.html ## the estimator in a browser tab: out/pla
 	@echo "$<: $$(wc -c < $<) bytes"
 
 build/playground/bslam.wasm: $(PLAYGROUND_C) $(CORE_HEADERS) $(wildcard playground/libc/*.h) mk/playground.mk
+	@command -v clang-19 >/dev/null && command -v wasm-ld-19 >/dev/null || { echo "playground: clang-19 and wasm-ld-19 make it;" \
+	    "install them with: apt-get install clang-19 lld-19" >&2; exit 2; }
 	@mkdir -p $(@D)
 	@$(PLAYGROUND_COMPILE) -Wl,--no-entry,--strip-all,--gc-sections,-z,stack-size=65536 $(PLAYGROUND_C) -o $@
 
 out/playground/index.html: build/playground/bslam.wasm playground/inline.py $(PLAYGROUND_PAGE)
-	@$(PYTHON) playground/inline.py $< $@
+	@$(or $(wildcard $(PYTHON)),python3) playground/inline.py $< $@

@@ -50,7 +50,7 @@ def test_setup_no_install_prints_the_command_and_exits_2(machine: Path) -> None:
     assert command == (
         "setup: install with: apt-get install -y --no-install-recommends"
         " gcc libc6-dev pkg-config libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi"
-        " cmake qemu-system-arm chromium-headless-shell valgrind g++ clang-19"
+        " cmake qemu-system-arm chromium-headless-shell valgrind g++ clang-19 lld-19"
     )
 
 
