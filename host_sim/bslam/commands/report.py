@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import statistics
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ _COLUMNS = (
 HEADINGS = [heading for heading, _ in _COLUMNS]
 _MOST_ROWS = 40
 _MOST_NOTES = 20
+_FAILED_NAMED = 3
 
 
 def finish(
@@ -43,6 +45,8 @@ def finish(
     """
     print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
     entries = [outcome.entry for outcome in result.outcomes]
+    if entries:
+        print(f"verdict: {verdict(entries)}")
     _say_each("presets", [", ".join(entry.get("presets", ())) for entry in entries])
     _say_each("align", [entry.get("align", "") for entry in entries])
     print(f"files in {out}: {', '.join(_files(result, more))}")
@@ -55,6 +59,22 @@ def finish(
     if result.bad_input is not None:
         raise BslamError(result.bad_input)
     return 0 if result.ok and fit else 1
+
+
+def verdict(entries: Sequence[Mapping[str, Any]]) -> str:
+    """How many runs are right, by what the others failed, and the worst figure."""
+    failed = [one for one in entries if one.get("failed", one["diverged"])]
+    good = f"{len(entries) - len(failed)} of {len(entries)} right"
+    if failed:
+        by = Counter(reason for one in failed for reason in one.get("failed_by", ["error"]))
+        names = ", ".join(str(one["name"]) for one in failed[:_FAILED_NAMED])
+        names += ", ..." if len(failed) > _FAILED_NAMED else ""
+        good += f", {len(failed)} FAILED by {', '.join(f'{one} ({by[one]})' for one in by)}: {names}"
+    scored = [one for one in entries if "position_error_m" in one]
+    if not scored:
+        return f"{good}; no truth says how large the error is" if not failed else good
+    worst = max(scored, key=lambda one: one["position_error_m"]["mean"])
+    return f"{good}; worst mean error {100.0 * worst['position_error_m']['mean']:.1f} cm, {worst['name']}"
 
 
 def _say_remarks(entries: Sequence[dict[str, Any]]) -> bool:

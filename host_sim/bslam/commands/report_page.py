@@ -18,6 +18,7 @@ import joblib
 
 from bslam.commands import compare, replay, run, sweep, tables
 from bslam.commands.arguments import positive_count, seeds_range, whole_number
+from bslam.commands.report import verdict
 from bslam.datasets.datasets import VARIABLE, data_root
 from bslam.errors import did_you_mean
 from bslam.evaluation.consistency import half_interval_95
@@ -50,8 +51,8 @@ REAL_SETS: Final = ("MRCLAM_Dataset1", "MRCLAM_Dataset2", "MRCLAM_Dataset6")
 _FIGURE3_SEED: Final = 2
 _WORDS: Final = (
     "Errors are distances of the estimated from the true position. What follows a plus-minus is half of the "
-    "95 % interval of a mean over runs. NEES is that of the pose: 3 is consistent. The paper shows one run "
-    "where this page has several."
+    "95 % interval of a mean over runs, from five runs on. NEES is that of the pose: 3 is consistent. The "
+    "paper shows one run where this page has several."
 )
 
 
@@ -169,7 +170,8 @@ def _tables(maker: _Maker) -> Section:
         for number, sigma_mps in enumerate(sigmas)
     ]
     what = f"{maker.scenario}, identity known, {len(maker.seeds)} runs a cell; cm."
-    return Section("Tables I to III, Figures 6 to 9", [_line(words)], what, found, pictures)
+    said = verdict([one.entry for one in result.outcomes])
+    return Section("Tables I to III, Figures 6 to 9", [_line(words)], what, found, pictures, said)
 
 
 def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
@@ -204,6 +206,7 @@ def _bound(maker: _Maker) -> Section:
     steps = load_scenario(maker.scenario).steps
     every = max(1, steps // 50)
     commands = []
+    ratios: list[float] = []
     rows = [["mean error, cm, at the same steps", "bslam", "the bound", "bslam / bound"]]
     for sigma in ("0.3", "0.6", "1.0"):
         words = ["compare", maker.scenario, "--only", "bslam,map", "--association", "known"]
@@ -222,6 +225,7 @@ def _bound(maker: _Maker) -> Section:
         own, bound = ({line["method"]: line for line in lines}[name] for name in ("bslam", "map"))
         figures = [_cm(own.get("on_bound_steps_m")), _cm(bound.get("on_bound_steps_m"))]
         ratio = own.get("ratio_to_bound")
+        ratios += [] if ratio is None else [ratio]
         rows.append([f"sigma {sigma} m/s", *figures, "-" if ratio is None else f"{ratio:.3f}"])
     what = (
         "What can be had at all: at each of these moments the exact maximum a posteriori of the whole drive "
@@ -229,7 +233,8 @@ def _bound(maker: _Maker) -> Section:
         f"chance on so few drives: {len(maker.bound_seeds)}, at every {every}th step. For directions alone "
         "it has no solution while a beacon was seen from one place only, so there is none here."
     )
-    return Section("The bound", commands, what, [Table(rows)])
+    said = f"at worst {max(ratios):.2f} times the error that can be had at all" if ratios else "not solved"
+    return Section("The bound", commands, what, [Table(rows)], verdict=said)
 
 
 def _cm(value_m: float | None) -> str:
@@ -238,7 +243,7 @@ def _cm(value_m: float | None) -> str:
 
 def _figure3(maker: _Maker) -> Section:
     """A threshold and the machines on one drive."""
-    commands, pictures, rows = [], [], [_HEADS]
+    commands, pictures, rows, said = [], [], [_HEADS], []
     for method in ("nearest", "svm"):
         words = ["run", "figure3", *_seed_words(range(_FIGURE3_SEED, _FIGURE3_SEED + 1))]
         words += ["--association", method]
@@ -246,12 +251,14 @@ def _figure3(maker: _Maker) -> Section:
         jobs = run.jobs_of(maker.parse(run, words, part))
         result = maker.run(jobs, part)
         commands.append(_line(words))
-        rows.append(_figures(method, [one.entry for one in result.outcomes]))
+        entries = [one.entry for one in result.outcomes]
+        rows.append(_figures(method, entries))
+        said.append(f"{method}: {verdict(entries)}")
         path = maker.out / part / f"{jobs[0].name}.map.png"
         if path.is_file():
             pictures.append(Picture(path.read_bytes(), f"Figure 3: {method}"))
     what = "The nearest beacon within a threshold makes false beacons round the true ones; looks do not."
-    return Section("Figure 3: false beacons", commands, what, [Table(rows)], pictures)
+    return Section("Figure 3: false beacons", commands, what, [Table(rows)], pictures, ". ".join(said))
 
 
 def _association(maker: _Maker) -> Section:
@@ -269,7 +276,8 @@ def _association(maker: _Maker) -> Section:
         "Twelve beacons in six close pairs. Known: identities are given, the best that association can do. "
         f"{len(seeds)} runs each."
     )
-    return Section("Association", [_line(words)], what, [Table(rows)])
+    said = ". ".join(f"{name}: {verdict(group)}" for name, group in groups.items())
+    return Section("Association", [_line(words)], what, [Table(rows)], verdict=said)
 
 
 _HEADS: Final = [
@@ -336,7 +344,8 @@ def _real(maker: _Maker) -> Section:
         what += f" Map: median {_cm(statistics.median(maps_m))} cm, worst {_cm(max(maps_m))} cm."
     first = maker.out / "real" / f"{jobs[0].name}.map.png"
     pictures = [Picture(first.read_bytes(), jobs[0].name)] if first.is_file() else []
-    return Section(title, commands, what, [Table(rows)], pictures)
+    said = verdict([one.entry for one in result.outcomes])
+    return Section(title, commands, what, [Table(rows)], pictures, said)
 
 
 _PARTS: Final[dict[str, Callable[[_Maker], Section]]] = {

@@ -29,7 +29,7 @@ EXAMPLES = """examples:
   bslam run paper_room --seeds 0:20 --sigma 1.0 --observation direction
   bslam run pairs --association mahalanobis --set match_d2=9.2
   bslam run paper_room --sensor camera --rig wide180
-  bslam run paper_room --film drive.gif
+  bslam run paper_room --observation direction --film drive.gif
   bslam run my_room.toml --filter standard --motion euler --record --out out/mine
 
 SCENARIO is a name or the path of a TOML file; each run writes its trajectory, map and pictures into --out."""
@@ -72,9 +72,8 @@ def _make_film(job: Job, path: Path) -> None:
 
 def _film_path(text: str) -> Path:
     if Path(text).suffix not in SUFFIXES:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is no picture that moves; allowed: FILE{', FILE'.join(SUFFIXES)}"
-        )
+        allowed = ", ".join(f"FILE{suffix}" for suffix in SUFFIXES)
+        raise argparse.ArgumentTypeError(f"'{text}' is no picture that moves; allowed: {allowed}")
     return Path(text)
 
 

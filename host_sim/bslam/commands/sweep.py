@@ -22,7 +22,7 @@ from bslam.commands.arguments import (
 from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
 from bslam.commands.helping import more_options
-from bslam.commands.report import HEADINGS, mean_row, table_of
+from bslam.commands.report import HEADINGS, mean_row, table_of, verdict
 from bslam.errors import BslamError
 from bslam.evaluation.consistency import half_interval_95, share_interval_95
 from bslam.evaluation.failure import is_exact
@@ -156,6 +156,8 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
             files.insert(0, PARQUET)
         except ImportError as error:
             print(f"no {PARQUET}: {error}; pip install pyarrow, and the same command writes it")
+    if result.entries:
+        print(f"verdict: {verdict(result.entries)}")
     if result.kept:
         print(f"{result.kept} of {len(result.entries)} runs were there already")
     print(f"files in {out}: {', '.join(files)}")

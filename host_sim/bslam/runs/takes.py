@@ -12,8 +12,10 @@ from bslam.runs.player import Books
 
 
 class Takes:
-    """Watches a run (see `runner.Watcher`) and keeps `count` moments of it, evenly apart, the last step's among
-    them. A moment's frame is the newest since the one before. The truth must be in the frame of the map.
+    """Watches a run (see `runner.Watcher`) and keeps `count` moments of it, evenly apart.
+
+    The last step's is among them. A moment's frame is the newest since the one before. The truth must be in
+    the frame of the map.
     """
 
     def __init__(self, log: Log, count: int) -> None:

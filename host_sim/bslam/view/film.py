@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageColor
 
 from bslam.moment import Moment, Stage
 from bslam.view.style import (
@@ -28,7 +28,7 @@ from bslam.view.style import (
 SUFFIXES: Final = (".gif", ".webp")
 _FRAME_MS: Final = 80
 _END_MS: Final = 2000  # how long the last one stands
-_COLOURS: Final = 48  # of a GIF's palette: lines and letters need no more
+_LEVELS: Final = 5  # of each colour in a GIF's palette
 _SIGMAS: Final = 2.0
 _RAY_M: Final = 3.0  # of a sighting without a distance
 _NOSE_M: Final = 0.45
@@ -53,38 +53,31 @@ class _Scene:
     def _draw_room(self, beacons_m: NDArray[np.float64]) -> None:
         axes, stage = self._room, self._stage
         x_low, y_low, x_high, y_high = stage.extent_m
-        axes.add_collection(
-            LineCollection(stage.walls_m.reshape(-1, 2, 2).tolist(), colors=WALL, linewidths=2.5)
-        )
+        walls = stage.walls_m.reshape(-1, 2, 2).tolist()
+        axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.5))
         axes.plot(*beacons_m.T, "*", color=BEACON, markersize=11, markeredgecolor="#6b4b00", zorder=3)
         self._truth = axes.plot([], [], color=TRUTH, linewidth=2.6, alpha=0.45, label="true path")[0]
         self._path = axes.plot([], [], color=ESTIMATE, linewidth=1.1, label="estimate")[0]
         self._rays = axes.add_collection(LineCollection([], zorder=2))
         self._map = axes.plot([], [], "+", color=SECOND, markersize=7, zorder=4, label="map, 2 sigma")[0]
         self._ellipses: Any = None
-        self._robots = [
-            axes.plot([], [], color=colour, linewidth=2.5, marker="o", markevery=[0], markersize=7, zorder=5)[
-                0
-            ]
-            for colour in (TRUTH, ESTIMATE)
-        ]
+        style: dict[str, Any] = {"linewidth": 2.5, "marker": "o", "markevery": [0], "markersize": 7}
+        self._robots = [axes.plot([], [], color=one, zorder=5, **style)[0] for one in (TRUTH, ESTIMATE)]
         for result, words in _SHOWN.items():
             axes.plot([], [], color=RESULT_COLOURS[result], linewidth=2, label=words)
         axes.set_aspect("equal")
         axes.set_xlim(x_low, x_high)
         axes.set_ylim(y_low, y_high)
         tidy(axes, "x, m", "y, m")
-        self.figure.legend(
-            loc="outside lower center", ncols=7, fontsize=7.5, frameon=False, columnspacing=1.2
-        )
+        style = {"ncols": 7, "fontsize": 8, "frameon": False, "columnspacing": 1.2}
+        self.figure.legend(loc="outside lower center", **style)
 
     def _draw_error(self, last: Moment) -> None:
         axes, course = self._error, last.course
-        self._bound = axes.plot(
-            [], [], color=TRUTH, linewidth=1, linestyle="--", label="2 sigma, by the filter"
-        )[0]
+        words = {"linestyle": "--", "label": "2 sigma, by the filter"}
+        self._bound = axes.plot([], [], color=TRUTH, linewidth=1, **words)[0]
         self._off = axes.plot([], [], color=ESTIMATE, linewidth=1, label="position error")[0]
-        highest_cm = 100.0 * max(np.nanmax(course.error_m), _SIGMAS * np.nanquantile(course.sd_m, 0.95), 0.01)
+        highest_cm = 100.0 * max(np.nanmax(course.error_m), _SIGMAS * np.max(course.sd_m), 0.01)
         axes.set_xlim(0.0, course.time_s[-1])
         axes.set_ylim(0.0, 1.3 * highest_cm)
         tidy(axes, "time, s", "cm")
@@ -100,14 +93,14 @@ class _Scene:
         for robot, pose in zip(self._robots, (course.truth[-1], course.estimate[-1]), strict=True):
             nose = pose[:2] + _NOSE_M * np.array([math.cos(pose[2]), math.sin(pose[2])])
             robot.set_data(*np.array([pose[:2], nose]).T)
-        rays = [_ray(self._stage.sensor, course.estimate[-1], one) for one in moment.frame]
-        self._rays.set_segments(rays)
+        self._rays.set_segments(_rays(self._stage.sensor, moment))
         self._rays.set_color([RESULT_COLOURS[one.verdict] for one in moment.frame])
         self._rays.set_linewidth([3.0 if one.wrong else 1.6 for one in moment.frame])
         self._map.set_data([one.x_m for one in moment.beacons], [one.y_m for one in moment.beacons])
         self._show_ellipses(moment)
-        self.figure.canvas.draw()
-        return Image.fromarray(np.asarray(self.figure.canvas.buffer_rgba())).convert("RGB")
+        canvas: Any = self.figure.canvas
+        canvas.draw()
+        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
     def _show_ellipses(self, moment: Moment) -> None:
         """Of the beacons and of the robot."""
@@ -122,7 +115,7 @@ class _Scene:
             offsets=[place for place, _ in places],
             offset_transform=self._room.transData,
             facecolors="none",
-            edgecolors=[*[SECOND] * len(moment.beacons), ESTIMATE],
+            edgecolors=[*[(SECOND, 1.0 if one.confirmed else 0.4) for one in moment.beacons], ESTIMATE],
             linewidths=1.3,
             zorder=4,
         )
@@ -136,14 +129,33 @@ def _axes(covariance_m2: NDArray[np.float64]) -> tuple[float, float, float]:
     return major_m, minor_m, math.degrees(math.atan2(directions[1, 1], directions[0, 1]))
 
 
-def _ray(
-    sensor: tuple[float, float, float], pose: NDArray[np.float64], told: Any
-) -> list[tuple[float, float]]:
+def _rays(sensor: tuple[float, float, float], moment: Moment) -> list[Any]:
+    """Both ends of each: as far as the sighting says, else to the beacon it was taken for."""
     x_m, y_m, yaw_rad = sensor
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    x0_m, y0_m = pose[0] + c * x_m - s * y_m, pose[1] + s * x_m + c * y_m
-    reach_m, course_rad = told.range_m or _RAY_M, pose[2] + yaw_rad + told.bearing_rad
-    return [(x0_m, y0_m), (x0_m + reach_m * math.cos(course_rad), y0_m + reach_m * math.sin(course_rad))]
+    *here_m, heading_rad = moment.course.estimate[-1]
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    start_m = np.array([here_m[0] + c * x_m - s * y_m, here_m[1] + s * x_m + c * y_m])
+    spots = {one.uid: np.array([one.x_m, one.y_m]) for one in moment.beacons}
+    rays = []
+    for told in moment.frame:
+        reach_m, course_rad = told.range_m, heading_rad + yaw_rad + told.bearing_rad
+        if reach_m is None:
+            spot_m = None if told.beacon_uid is None else spots.get(told.beacon_uid)
+            reach_m = _RAY_M if spot_m is None else float(np.hypot(*(spot_m - start_m)))
+        rays.append([start_m, start_m + reach_m * np.array([math.cos(course_rad), math.sin(course_rad)])])
+    return rays
+
+
+def _palette() -> Image.Image:
+    """The colours that are drawn and their ways to white, as smooth edges have them."""
+    drawn = (TRUTH, ESTIMATE, SECOND, BEACON, WALL, "#6b4b00", *dict.fromkeys(RESULT_COLOURS.values()))
+    white = np.full(3, 255.0)
+    levels = np.linspace(1.0, 1.0 / _LEVELS, _LEVELS)[:, None, None]
+    solid = np.array([ImageColor.getrgb(one) for one in drawn], dtype=np.float64)
+    colours = (white + levels * (solid - white)).reshape(-1, 3)
+    image = Image.new("P", (1, 1))
+    image.putpalette([255, 255, 255, *colours.round().astype(int).ravel().tolist()])
+    return image
 
 
 def film(stage: Stage, moments: Sequence[Moment], suffix: str) -> bytes:
@@ -152,8 +164,7 @@ def film(stage: Stage, moments: Sequence[Moment], suffix: str) -> bytes:
     frames = [scene.show(one) for one in moments]
     times_ms = [_FRAME_MS] * (len(frames) - 1) + [_END_MS]
     if suffix == ".gif":
-        # One palette, of the frame that shows most: with one of its own each frame would flicker.
-        palette = frames[-1].quantize(_COLOURS, dither=Image.Dither.NONE)
+        palette = _palette()  # with one of its own each frame would flicker
         frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
     buffer = io.BytesIO()
     first, *rest = frames

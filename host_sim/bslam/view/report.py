@@ -33,13 +33,14 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page; commands: those that make what is in it."""
+    """A part of the page; commands: those that make what is in it; verdict: what came of it, first of all."""
 
     title: str
     commands: Sequence[str]
     words: str
     tables: Sequence[Table] = ()
     pictures: Sequence[Picture] = ()
+    verdict: str = ""
 
 
 _PAGE: Final = """<!DOCTYPE html>
@@ -47,49 +48,60 @@ _PAGE: Final = """<!DOCTYPE html>
 <head>
 <meta charset="utf-8">
 <title>{{ title }}</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
-  body { font: 15px/1.45 sans-serif; color: #222; max-width: 75em; margin: 2em auto; padding: 0 1em; }
+  body { font: 16px/1.5 system-ui, sans-serif; color: #222; }
+  body { max-width: 70em; margin: 1.5em auto; padding: 0 1em; }
+  h1, td, th, code, li { overflow-wrap: anywhere; }
   h2 { border-bottom: 1px solid #ccc; margin-top: 2.2em; }
+  .wide { overflow-x: auto; }
   table { border-collapse: collapse; margin: 1em 0; font-size: 14px; }
   caption { text-align: left; color: #555; padding-bottom: 0.3em; }
   th, td { padding: 0.2em 0.8em; border-bottom: 1px solid #e4e4e4; text-align: right; }
   th:first-child, td:first-child { text-align: left; }
   pre { background: #f4f4f4; padding: 0.6em 1em; overflow-x: auto; }
   figure { margin: 1.5em 0; }
-  img { max-width: min(100%, 60em); }
+  img { max-width: 100%; min-width: 640px; }
   figcaption { color: #555; }
+  .verdict { border-left: 4px solid #0067a8; padding: 0.1em 0.8em; background: #f2f7fb; }
+  @media (max-width: 700px) {
+    table { font-size: 13px; }
+    th, td { padding: 0.2em 0.35em; overflow-wrap: normal; }
+  }
 </style>
 </head>
 <body>
 <h1>{{ title }}</h1>
+<ul class="verdict">
+{%- for section in sections %}
+<li><a href="#part{{ loop.index }}">{{ section.title }}</a>
+{%- if section.verdict %}: {{ section.verdict }}{% endif %}</li>
+{%- endfor %}
+</ul>
 <p>{{ words }}</p>
 {%- macro grid(table) %}
-<table>
+<div class="wide"><table>
 {%- if table.caption %}<caption>{{ table.caption }}</caption>{% endif %}
 <tr>{% for cell in table.rows[0] %}<th>{{ cell }}</th>{% endfor %}</tr>
 {%- for row in table.rows[1:] %}
 <tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {%- endfor %}
-</table>
+</table></div>
 {%- endmacro %}
-{{ grid(about) }}
-<ul>
-{%- for section in sections %}
-<li><a href="#part{{ loop.index }}">{{ section.title }}</a></li>
-{%- endfor %}
-</ul>
 {%- for section in sections %}
 <h2 id="part{{ loop.index }}">{{ section.title }}</h2>
+{%- if section.verdict %}<p class="verdict">{{ section.verdict }}</p>{% endif %}
 <p>{{ section.words }}</p>
 {%- if section.commands %}
 <pre>{{ section.commands | join("\\n") }}</pre>
 {%- endif %}
 {%- for table in section.tables %}{{ grid(table) }}{% endfor %}
 {%- for picture in section.pictures %}
-<figure><img alt="{{ picture.caption }}" src="{{ picture.url }}">
+<figure><div class="wide"><img alt="{{ picture.caption }}" src="{{ picture.url }}"></div>
 <figcaption>{{ picture.caption }}</figcaption></figure>
 {%- endfor %}
 {%- endfor %}
+{{ grid(about) }}
 </body>
 </html>
 """

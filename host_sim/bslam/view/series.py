@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from bslam.view.style import BAND, ESTIMATE, SECOND, TRUTH, moving_mean, new_figure, thinned, tidy
 
 _SMOOTH_S: Final = 5.0
-_TOP: Final = 1.3  # room for the legend above the highest error
+_PAGE_IN: Final = 9.6
+_TOP: Final = 1.5  # room for the legend above the highest error
 
 
 @dataclass(frozen=True)
@@ -45,17 +46,19 @@ def draw_run_in(error_axes: Any, nees_axes: Any, series: Series) -> None:
 
 
 def draw_cells(title: str, cells: Sequence[Series]) -> Figure:
-    """Ways of running side by side, errors on one scale above and NEES below."""
-    figure = new_figure(2.5 + 5.0 * len(cells), 6.8)
-    panels = figure.subplots(2, len(cells), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2))
-    for column, series in enumerate(cells):
-        draw_error(panels[0, column], series)
-        draw_nees(panels[1, column], series)
-        panels[0, column].set_title(series.title, fontsize=10)
-        panels[0, column].set_xlabel("")
+    """A row for each way of running: errors on one scale at the left, NEES at the right.
+
+    No wider than a page, whose letters would shrink with it.
+    """
+    figure = new_figure(_PAGE_IN, 0.6 + 2.9 * len(cells))
+    panels = figure.subplots(len(cells), 2, sharex=True, sharey="col", squeeze=False)
+    for row, series in zip(panels, cells, strict=True):
+        draw_error(row[0], series)
+        draw_nees(row[1], series)
+        row[0].set_title(series.title, fontsize=10, loc="left")
+    for axes in panels[:-1].flat:
+        axes.set_xlabel("")
     panels[0, 0].set_ylim(0.0, _TOP * max(_highest_cm(series) for series in cells))
-    for axes in panels[:, 1:].flat:
-        axes.set_ylabel("")
     figure.suptitle(title, fontsize=12)
     return figure
 
@@ -99,7 +102,7 @@ def draw_nees(axes: Any, series: Series) -> None:
     axes.set_yscale("log")
     axes.set_xlim(float(series.time_s[0]), float(series.time_s[-1]))
     tidy(axes, "time, s", "NEES of the pose")
-    axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=3)
+    axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=2)
 
 
 def _draw_window(

@@ -48,7 +48,14 @@ def test_report_holds_its_pictures_and_the_figures_of_its_runs(
     table = page.get_by_role("table").filter(has_text="Table III")
     row = table.get_by_role("row", name="Mean error", exact=False).first
     assert row.get_by_role("cell").all_inner_texts()[1] == "15.1"  # the paper's
-    assert row.get_by_role("cell").all_inner_texts()[2].startswith(f"{mean_cm:.2f} ± ")
+    assert row.get_by_role("cell").all_inner_texts()[2] == f"{mean_cm:.2f}"  # of two runs: no interval
+    verdict = page.get_by_role("listitem").filter(has_text="Tables I to III")
+    expect(verdict).to_contain_text("of 18 right")
+    for width in (360, 1260):  # what is too wide scrolls by itself; what is shown is not shrunk
+        page.set_viewport_size({"width": width, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    shrunk = page.evaluate("[...document.images].map(one => one.width / one.naturalWidth)")
+    assert min(shrunk) > 0.85
     bound = page.get_by_role("row", name="sigma 0.6 m/s")
     assert bound.get_by_role("cell").all_inner_texts()[1:] == ["5.10", "5.00", "1.020"]
     expect(
