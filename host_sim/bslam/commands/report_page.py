@@ -321,7 +321,7 @@ def _real(maker: _Maker) -> Section:
     if len(there) < len(REAL_SETS):
         missing = ", ".join(name for name in REAL_SETS if name not in there)
         why = f"Not here: {missing} of the UTIAS MRCLAM data are not at hand; {VARIABLE} names their place."
-        return Section(title, commands, why)
+        return Section(title, commands, why, verdict="not run")
     jobs = replay.jobs_of(maker.parse(replay, words, "real"), "mrclam", there)
     result = maker.run(jobs, "real")
     rows = [["log", "truth", "position RMSE, cm", "odometry alone", "map RMSE, cm", "mapped", "of", "NEES"]]

@@ -50,23 +50,23 @@ _PAGE: Final = """<!DOCTYPE html>
 <title>{{ title }}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
-  body { font: 16px/1.5 system-ui, sans-serif; color: #222; }
+  body { font: 16px/1.5 system-ui, sans-serif; color: #222; overflow-wrap: anywhere; }
   body { max-width: 70em; margin: 1.5em auto; padding: 0 1em; }
-  h1, td, th, code, li { overflow-wrap: anywhere; }
   h2 { border-bottom: 1px solid #ccc; margin-top: 2.2em; }
   .wide { overflow-x: auto; }
-  table { border-collapse: collapse; margin: 1em 0; font-size: 14px; }
+  table { border-collapse: collapse; margin: 1em 0; font-size: 14px; overflow-wrap: normal; }
   caption { text-align: left; color: #555; padding-bottom: 0.3em; }
   th, td { padding: 0.2em 0.8em; border-bottom: 1px solid #e4e4e4; text-align: right; }
   th:first-child, td:first-child { text-align: left; }
-  pre { background: #f4f4f4; padding: 0.6em 1em; overflow-x: auto; }
+  pre { background: #f4f4f4; padding: 0.6em 1em; white-space: pre-wrap; }
   figure { margin: 1.5em 0; }
   img { max-width: 100%; min-width: 640px; }
   figcaption { color: #555; }
   .verdict { border-left: 4px solid #0067a8; padding: 0.1em 0.8em; background: #f2f7fb; }
+  ul.verdict { padding-left: 1.8em; }
   @media (max-width: 700px) {
     table { font-size: 13px; }
-    th, td { padding: 0.2em 0.35em; overflow-wrap: normal; }
+    th, td { padding: 0.2em 0.35em; }
   }
 </style>
 </head>

@@ -18,6 +18,7 @@ _SIGMAS: Final = 2.0  # size of the ellipses
 # An estimate that got lost is cut off this far (times the extent of the truth) outside, or the room would
 # shrink.
 _LOST_MARGIN: Final = 0.6
+_EDGE: Final = 0.04
 
 
 @dataclass(frozen=True)
@@ -148,4 +149,5 @@ def _extent(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     margin_m = _LOST_MARGIN * max(float(np.max(high_m - low_m)), 1.0)
     low_m = np.maximum(np.minimum(low_m, shown_m.min(axis=0)), low_m - margin_m)
     high_m = np.minimum(np.maximum(high_m, shown_m.max(axis=0)), high_m + margin_m)
-    return low_m - 0.4, high_m + 0.4
+    edge_m = max(0.4, _EDGE * float(np.max(high_m - low_m)))  # of stars and their numbers at a wall
+    return low_m - edge_m, high_m + edge_m

@@ -64,7 +64,12 @@ def test_scenarios_are_all_listed():
 def test_options_of_a_run_are_all_listed(capsys):
     with pytest.raises(SystemExit):
         main(["run", "--help-all"])
-    known = set(re.findall(r"(--[a-z-]+)", capsys.readouterr().out)) - {"--help", "--help-all", "--record"}
+    known = set(re.findall(r"(--[a-z-]+)", capsys.readouterr().out)) - {
+        "--help",
+        "--help-all",
+        "--record",
+        "--film",
+    }
     assert set(re.findall(r"(--[a-z-]+)", " ".join(column(section(CLI, "Options of a run"))))) == known
 
 

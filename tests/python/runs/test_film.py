@@ -1,0 +1,79 @@
+"""`bslam run --film`: a picture that moves, the same for the same seed."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageColor
+
+import bslam
+from bslam.cli import main
+from bslam.commands.report import verdict
+from bslam.view.style import RESULT_COLOURS
+
+STEPS = 12
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    world = (Path(bslam.__file__).parent / "scenarios/paper_room.toml").read_text(encoding="utf-8")
+    assert "steps = 5000\n" in world
+    path = tmp_path / "short.toml"
+    path.write_text(world.replace("steps = 5000\n", f"steps = {STEPS}\n"), encoding="utf-8")
+    return path
+
+
+def shows(frame: Image.Image, colour: str) -> bool:
+    pixels = np.asarray(frame.convert("RGB")).astype(int)
+    return bool((np.abs(pixels - ImageColor.getrgb(colour)).max(axis=2) < 8).any())
+
+
+def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path, tmp_path: Path) -> None:
+    words = ["run", str(short), "--pictures", "0", "--association", "known"]
+    for name in ("one.gif", "two.gif"):
+        assert main([*words, "--film", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "one.gif").read_bytes() == (tmp_path / "two.gif").read_bytes()
+    with Image.open(tmp_path / "one.gif") as film:
+        assert film.n_frames == STEPS + 1
+        assert film.info["loop"] == 0
+        # The legend has each colour; rays of fused sightings come later.
+        counts = []
+        for frame in (0, STEPS):
+            film.seek(frame)
+            pixels = np.asarray(film.convert("RGB")).astype(int)
+            fused = ImageColor.getrgb(RESULT_COLOURS["matched"])
+            counts.append(int((np.abs(pixels - fused).max(axis=2) < 8).sum()))
+            assert all(shows(film, RESULT_COLOURS[one]) for one in ("matched", "wrong", "new"))
+        assert counts[1] > 2 * counts[0]
+
+
+def test_film_of_another_kind_is_refused_before_anything_runs(
+    short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["run", str(short), "--film", "drive.mp4", "--out", str(tmp_path / "out")])
+    assert "'drive.mp4' is no picture that moves; allowed: FILE.gif, FILE.webp" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_verdict_says_how_many_by_what_and_the_worst(
+    short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(short), "--pictures", "0", "--out", str(tmp_path)]) == 0
+    (entry,) = json.loads((tmp_path / "summary.json").read_text())["runs"]
+    said = verdict([entry])
+    assert f"verdict: {said}\n" in capsys.readouterr().out
+    assert f"cm, {entry['name']}" in said
+    good = {"name": "a", "diverged": False, "failed": False, "position_error_m": {"mean": 0.05}}
+    bad = good | {
+        "name": "b",
+        "failed": True,
+        "failed_by": ["map", "nees"],
+        "position_error_m": {"mean": 0.3},
+    }
+    broken = {"name": "c", "diverged": True, "failed": True, "error": "no such file"}
+    assert verdict([good]) == "1 of 1 right; worst mean error 5.0 cm, a"
+    assert verdict([good, bad, broken]) == (
+        "1 of 3 right, 2 FAILED by map (1), nees (1), error (1): b, c; worst mean error 30.0 cm, b"
+    )
