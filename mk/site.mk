@@ -1,4 +1,4 @@
-# The site: one folder of files for any web server, or to open from the disk. It asks nobody else for anything.
+# The site: one folder of files for any web server, or to read from the disk (then without search). It asks nobody else.
 
 SITE_VENV := build/site/venv
 SITE_STAMP := $(SITE_VENV)/stamp

@@ -1,4 +1,4 @@
-"""The public CI: pinned, of make targets that exist, and said not to have run. `make lint-ci` reads it whole."""
+"""The public CI: pinned, of make targets that exist, said not to have run. `make lint-ci` reads it whole."""
 
 import re
 from pathlib import Path
