@@ -22,10 +22,11 @@ from bslam.core.slam import Slam
 from bslam.errors import BslamError, did_you_mean
 from bslam.evaluation.metrics import Evaluation, evaluate, summarise
 from bslam.evaluation.trace import Trace
-from bslam.log import Log
+from bslam.log import WHEEL_NOISES, Log
 from bslam.logcheck.check import check_folder
 from bslam.logcheck.finding import Report
-from bslam.options import Number, RunOptions
+from bslam.options import Number, RunOptions, ensure_word
+from bslam.parsing.settings import integer
 from bslam.runs.methods import maker_of
 from bslam.runs.rival import run_algorithm
 from bslam.runs.runner import run_log
@@ -101,7 +102,10 @@ def simulate(
     "speedometer" (the reading errs) or "actuation" (the wheel does); None: as the scenario has it. Raises
     BslamError for what is not allowed.
     """
-    return simulate_scenario(load_scenario(scenario), seed, sigma_mps, noise)
+    drawn = integer(0).convert(seed, "seed")
+    if noise is not None:
+        ensure_word("noise", noise, WHEEL_NOISES)
+    return simulate_scenario(load_scenario(scenario), drawn, sigma_mps, noise)
 
 
 def check(log: Log) -> Report:
@@ -133,6 +137,8 @@ def run(log: Log, algorithm: Callable[..., Algorithm] | None = None, **words: Un
         trace = run_log(log, options)
     else:  # whose covariance is of x, y, theta, and so are the filter's words for it
         options = replace(options, filter="standard")
+        if getattr(algorithm, "needs_identity", False):
+            options = replace(options, association="known")
         trace = run_algorithm(log, options, maker_of(algorithm), lambda step: None)
     return Run(log, options, trace, evaluate(log, trace, options))
 

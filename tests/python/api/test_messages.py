@@ -44,6 +44,7 @@ def test_nearest_name(word, allowed, said) -> None:
         (lambda: Slam(real="flaot"), "'float'"),
         (lambda: Slam().odometry("wheel", 0, 0, 0), "'wheels'"),
         (lambda: bslam.simulate("paper_rom"), "'paper_room'"),
+        (lambda: bslam.simulate("paper_room", noise="actuaton"), "'actuation'"),
         (lambda: DRIVE.run(asociation="known"), "'association'"),
         (lambda: DRIVE.run(gate_d2=9.0), r"parameters={'gate_d2': ...}"),
         (lambda: DRIVE.run(parameters={"gate_d": 9.0}), "'gate_d2'"),
@@ -78,6 +79,10 @@ def test_a_misspelt_name_is_met_with_the_nearest(call, name) -> None:
         ),
         (lambda: DRIVE.run(seed=0.5), "seed: 0.5 is not allowed; allowed: an integer from 0"),
         (lambda: DRIVE.run(presets="paper"), "presets: 'paper' is not allowed; allowed: a tuple of names"),
+        (
+            lambda: bslam.simulate("paper_room", seed="x"),
+            "seed: 'x' is not allowed; allowed: an integer from 0",
+        ),
         (lambda: DRIVE.run(frozen=True), "frozen: no map; allowed: with kept_map"),
         (lambda: DRIVE.run(kept_map="a.bslam", known_map=True), "with known_map; allowed: one of them"),
         (lambda: DRIVE.run(association="known:2"), "'2' is not a rate; allowed: known, known:RATE with"),

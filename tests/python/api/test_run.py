@@ -100,6 +100,8 @@ def test_an_algorithm_of_ones_own_is_judged_alike() -> None:
     assert run.errors is not None and DRIVE.truth is not None
     far_m = np.hypot(*run.errors.truth[1:, :2].T)
     np.testing.assert_allclose(run.errors.error_m[1:], far_m)
+    named = DRIVE.run(type("Named", (Standstill,), {"needs_identity": True}), association="mahalanobis")
+    assert named.summary["association"] == "known"
     with pytest.raises(BslamError, match="Half has no observe, map; allowed: a class as in"):
         DRIVE.run(type("Half", (), {"reset": 0, "odometry": 0, "pose": 0}))
 
