@@ -4,32 +4,44 @@
 const LOG_FILES = ["odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml"];
 const FILE_BYTES_MAX = 256 << 20;
 
-/** Every file of a drop, those in its folders too, and what to call them together. */
+/** Every file of a drop, those in its folders too, and what to call them together. Throws PageError. */
 async function droppedFiles(transfer) {
     const files = [...transfer.files];
+    // Asked for at once: after the first wait the browser has forgotten what was dropped.
+    const handles = [...transfer.items].map((item) => item.getAsFileSystemHandle?.());
     const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.());
     const folder = entries.find((entry) => entry?.isDirectory);
     if (!folder) {
         return { name: "log", files };
     }
-    const found = await Promise.all(entries.filter(Boolean).map(filesOfEntry));
-    return { name: folder.name, files: found.flat() };
+    try {
+        return {
+            name: folder.name,
+            files: await filesIn(folder, (await Promise.all(handles)).filter(Boolean)),
+        };
+    } catch (error) {
+        const said = `${folder.name}: this browser does not read a folder here (${error.message})`;
+        throw new PageError(`${said}; allowed: its files, all together`);
+    }
 }
 
-async function filesOfEntry(entry) {
-    if (entry.isFile) {
-        return [await new Promise((resolve, reject) => entry.file(resolve, reject))];
-    }
-    const reader = entry.createReader();
+/** The files of a dropped folder itself: by handles, which work without a server, or where there are none. */
+async function filesIn(folder, handles) {
+    const handle = handles.find((one) => one.kind === "directory");
     const found = [];
-    for (
-        let some;
-        (some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject))).length;
-
-    ) {
-        found.push(...some.filter((one) => one.isFile)); // of the log's folder itself
+    if (handle) {
+        for await (const one of handle.values()) {
+            found.push(...(one.kind === "file" ? [await one.getFile()] : []));
+        }
+        return found;
     }
-    return (await Promise.all(found.map(filesOfEntry))).flat();
+    const reader = folder.createReader();
+    const some = () => new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    for (let read = await some(); read.length; read = await some()) {
+        found.push(...read.filter((one) => one.isFile));
+    }
+    const fileOf = (entry) => new Promise((resolve, reject) => entry.file(resolve, reject));
+    return Promise.all(found.map(fileOf));
 }
 
 /** Texts of the files of a log by their names without ".gz". Throws PageError if there is none. */

@@ -17,11 +17,13 @@ function bindFiles() {
     window.addEventListener("dragleave", (event) => {
         document.body.classList.toggle("dropping", event.relatedTarget !== null);
     });
-    window.addEventListener("drop", async (event) => {
+    window.addEventListener("drop", (event) => {
         event.preventDefault();
         document.body.classList.remove("dropping");
-        const { name, files } = await droppedFiles(event.dataTransfer);
-        loadFiles(name, files);
+        orSay(async () => {
+            const { name, files } = await droppedFiles(event.dataTransfer);
+            await loadFiles(name, files);
+        });
     });
 }
 

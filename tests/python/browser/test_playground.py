@@ -233,6 +233,18 @@ def test_playground_a_dropped_log_ends_where_replay_does(playground, tmp_path, k
     expect(playground.locator("#title")).to_have_text("A robot in a room")
 
 
+def test_playground_takes_a_folder_that_is_dropped(playground, tmp_path):
+    folder = folder_of(made_up(seconds=20.0), tmp_path / "my_drive")
+    (folder / "notes.txt").write_text("no part of a log")
+    (folder / "deeper").mkdir()
+    session = playground.context.new_cdp_session(playground)
+    dragged = {"items": [], "files": [str(folder)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 99, "y": 99, "data": dragged})
+    expect(playground.locator("#title")).to_have_text("my_drive: 0 findings")
+    assert playground.evaluate("document.body.className") == ""
+
+
 def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
     folder = folder_of(made_up(), tmp_path / "drive")
     playground.evaluate(DROP, texts_of(folder))
