@@ -48,8 +48,9 @@ class Drive {
         this.choices = choices;
         this.world = new World(choices);
         this.estimator = new Estimator();
+        const toldSigma = this.world.robot.wheel_speed_sigma_mps * choices.toldNoise;
         const log = {
-            robot: this.world.robot,
+            robot: { ...this.world.robot, wheel_speed_sigma_mps: toldSigma },
             odometry: { kind: "wheels", timeUs: [0, STEP_US] },
             sightings: {},
         };

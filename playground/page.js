@@ -14,7 +14,7 @@ const KEYS = {
 const STEPS_A_PICTURE = 60; // a slow machine drives slower than asked, and stays usable
 const TAP_MS = 400;
 const FIRST_STEPS = 25; // so that there is a map at once
-const NUMBERS = ["wheelNoise", "beacons", "seed", "fieldOfView"];
+const NUMBERS = ["wheelNoise", "toldNoise", "beacons", "seed", "fieldOfView"];
 const WORDS = ["filter", "association", "observation"];
 
 const element = (id) => document.getElementById(id);

@@ -180,6 +180,21 @@ def test_playground_a_seed_decides_the_drive(functions):
     assert prints[0] == prints[1] != prints[2]
 
 
+def test_playground_a_filter_that_is_told_too_little_noise_is_inconsistent(functions):
+    nees = [
+        functions.evaluate(
+            """told => {
+                const drive = new Drive({ ...readChoices(), seed: 2, toldNoise: told });
+                for (let step = 0; step < 600; step++) drive.step(null);
+                return drive.meanNees.value;
+            }""",
+            told,
+        )
+        for told in (1, 0.25)
+    ]
+    assert nees[0] < 5.0 < 8.0 < nees[1]
+
+
 def test_playground_is_driven_by_keys(playground):
     before = playground.evaluate("page.drive.world.pose")
     playground.keyboard.down("ArrowUp")
