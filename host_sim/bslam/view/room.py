@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from bslam.log import Beacons
@@ -19,6 +20,7 @@ _SIGMAS: Final = 2.0  # size of the ellipses
 # shrink.
 _LOST_MARGIN: Final = 0.6
 _EDGE: Final = 0.04
+_HALO: Final = [withStroke(linewidth=2.5, foreground="white")]  # where a path runs under a number
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def _draw_beacons(axes: Any, beacons: Beacons, name: Callable[[int], str]) -> No
     axes.plot(beacons.x_m, beacons.y_m, color=BEACON, label="true beacon", zorder=5, **style)
     for identity, x_m, y_m in zip(beacons.beacon_id.tolist(), beacons.x_m, beacons.y_m, strict=True):
         style = {"xytext": (7, 6), "textcoords": "offset points", "fontsize": 8, "color": "#6b4b00"}
-        axes.annotate(name(identity), (x_m, y_m), parse_math=False, **style)
+        axes.annotate(name(identity), (x_m, y_m), parse_math=False, zorder=8, **style, path_effects=_HALO)
 
 
 def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:
