@@ -22,7 +22,7 @@ RESULT_COLOURS: Final = {
     "matched": "#00795c",
     "new": "#0067a8",
     WRONG_RESULT: "#c44601",
-    "deferred": "#8a6d00",
+    "deferred": "#666666",
     "rejected": "#8f4a80",
     "refused": "#8f4a80",
 }
