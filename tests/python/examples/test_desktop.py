@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bslam.cli import main
-from bslam.log import Log, Odometry, first_steps, write_folder
+from bslam.log import Log, Odometry, first_steps
 from bslam.world.simulate import load_scenario, simulate
 from examples import tag_room
 from examples.building import EXAMPLES, build_as_its_readme_says, run
@@ -50,7 +50,7 @@ def log_of(kind: str) -> Log:
 def test_desktop_csv_gives_what_replay_gives(
     tmp_path: Path, desktop_csv: Path, kind: str, settings: list[str], refuses: int
 ) -> None:
-    write_folder(log_of(kind), tmp_path / "drive")
+    log_of(kind).write(tmp_path / "drive")
     words = [word for one in settings for word in ("--set", one)]
     out = tmp_path / "out"
     replayed = ["replay", "csv", str(tmp_path / "drive"), "--out", str(out), "--pictures", "0"]

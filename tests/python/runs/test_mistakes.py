@@ -16,7 +16,7 @@ from bslam.core import Slam
 from bslam.core.raw import library
 from bslam.core.vision import FrontEnd
 from bslam.errors import BslamError, did_you_mean
-from bslam.log import Log, write_folder
+from bslam.log import Log
 from bslam.logcheck.check import check_log
 from bslam.rig import load_rig
 from logcheck.drives import made_up, with_odometry, with_sightings
@@ -103,7 +103,7 @@ def test_parameter_beyond_its_range_is_refused_before_anything_is_written(
 
 def test_log_without_identities_names_the_methods_that_need_none(capsys, tmp_path):
     log = with_sightings(LOG, beacon_id=np.full(len(LOG.sightings.time_us), -1))
-    write_folder(log, tmp_path / "log")
+    log.write(tmp_path / "log")
     words = ["--association", "known", "--pictures", "0", "--jobs", "1", "--out", str(tmp_path / "out")]
     assert main(["replay", "csv", str(tmp_path / "log"), *words]) == 1
     needs_none = "log: no sighting has an identity: --association mahalanobis, joint or nearest needs none\n"
@@ -152,7 +152,7 @@ def in_nanoseconds(log: Log) -> Log:
     ],
 )
 def test_slip_in_a_log_is_named_with_what_mends_it(slip, what, mend, capsys, tmp_path):
-    write_folder(slip(LOG), tmp_path / "log")
+    slip(LOG).write(tmp_path / "log")
     assert main(["check", str(tmp_path / "log"), "--out", str(tmp_path / "out")]) == 1
     said = [line.strip() for line in capsys.readouterr().out.splitlines()]
     assert any(line.startswith("found: ") and line.endswith(what) for line in said)
@@ -161,7 +161,7 @@ def test_slip_in_a_log_is_named_with_what_mends_it(slip, what, mend, capsys, tmp
 
 def test_degrees_are_refused_by_the_reader_with_the_factor(capsys, tmp_path):
     log = with_sightings(LOG, bearing_rad=np.degrees(LOG.sightings.bearing_rad))
-    write_folder(log, tmp_path / "log")
+    log.write(tmp_path / "log")
     assert main(["replay", "csv", str(tmp_path / "log"), "--jobs", "1", "--out", str(tmp_path / "out")]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
     assert "sightings.csv, line 2, column bearing_rad: " in line
@@ -183,7 +183,7 @@ def test_degrees_are_refused_by_the_reader_with_the_factor(capsys, tmp_path):
     ],
 )
 def test_replay_of_a_log_with_a_slip_leads_to_the_check(slip, said, capsys, tmp_path):
-    write_folder(slip(LOG), tmp_path / "log")
+    slip(LOG).write(tmp_path / "log")
     words = ["--pictures", "0", "--jobs", "1", "--out", str(tmp_path / "out")]
     main(["replay", "csv", str(tmp_path / "log"), *words])
     assert said in "".join(capsys.readouterr())
