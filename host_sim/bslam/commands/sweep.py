@@ -151,13 +151,12 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
         files.insert(1, table)
         print(text)
     if result.entries:
+        print(f"verdict: {verdict(result.entries)}")
         try:
             write_parquet(out / PARQUET, result.entries)
             files.insert(0, PARQUET)
         except ImportError as error:
             print(f"no {PARQUET}: {error}; pip install pyarrow, and the same command writes it")
-    if result.entries:
-        print(f"verdict: {verdict(result.entries)}")
     if result.kept:
         print(f"{result.kept} of {len(result.entries)} runs were there already")
     print(f"files in {out}: {', '.join(files)}")
