@@ -14,6 +14,7 @@ from bslam.evaluation.bound import has_bound, mean_bound_m
 from bslam.evaluation.consistency import POSE_95, nees
 from bslam.evaluation.failure import NEES_MAX, is_exact, map_one_to_one, was_off
 from bslam.evaluation.nameless import lay_over, nearest_of
+from bslam.evaluation.relative import relative_pose_error
 from bslam.evaluation.remarks import notes_on, problems_of
 from bslam.evaluation.trace import MapBeacon, SightingCounts, Trace
 from bslam.evaluation.truth import (
@@ -72,8 +73,7 @@ def evaluate(log: Log, trace: Trace, options: RunOptions) -> Evaluation | None:
     by_map = _fit_map(map_align, log, trace, by_path if scored.sum() > 1 else None)
     to_truth = by_path if log.truth is not None else by_map
     estimate = to_truth.poses(trace.pose)
-    scales = (float(trace.parameters.get(name, 1.0)) for name in ("forward_scale", "turn_scale"))
-    alone = dead_reckoning(log, *scales)
+    alone = _odometry_alone(log, trace)
     alone = fit(align, alone[scored, :2], truth[scored, :2]).poses(alone)
     return Evaluation(
         time_s=trace.time_s,
@@ -112,6 +112,7 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
     if evaluation is not None:
         entry |= {"align": evaluation.align, "map_align": evaluation.map_align}
         entry |= _position_figures(evaluation)
+        entry |= _relative_figures(log, trace, evaluation)
         entry |= _map_figures(log, trace, evaluation)
         if options.observation == "direction" and evaluation.align != "none":
             entry |= _scaled_figures(log, trace, evaluation)
@@ -213,6 +214,11 @@ def _fit_map(align: str, log: Log, trace: Trace, by_path: Rigid | None) -> Rigid
     return lay_over(align, _places_m([one for one in trace.beacons if one.confirmed]), true_m, by_path)
 
 
+def _odometry_alone(log: Log, trace: Trace) -> NDArray[np.float64]:
+    scales = (float(trace.parameters.get(name, 1.0)) for name in ("forward_scale", "turn_scale"))
+    return dead_reckoning(log, *scales)
+
+
 def _distance(poses: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.hypot(poses[:, 0] - truth[:, 0], poses[:, 1] - truth[:, 1])
 
@@ -278,6 +284,18 @@ def _position_figures(evaluation: Evaluation) -> dict[str, Any]:
     figures |= _mean_if_any("nees_mean", evaluation.nees)
     inside = np.where(np.isfinite(evaluation.nees), evaluation.nees < POSE_95, np.nan)
     return figures | _mean_if_any("nees_inside_95", inside)
+
+
+def _relative_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, dict[str, float]]:
+    """Of poses as they stand in the map frame: no alignment changes a rigid motion between two of them."""
+    if log.truth is None or not is_dense(log.truth):
+        return {}
+    paths = {
+        "relative_pose_error": trace.pose,
+        "dead_reckoning_relative_pose_error": _odometry_alone(log, trace),
+    }
+    figures = {name: relative_pose_error(poses, evaluation.truth) for name, poses in paths.items()}
+    return {name: ones for name, ones in figures.items() if ones}
 
 
 def _mean_if_any(name: str, values: NDArray[np.float64]) -> dict[str, float]:
