@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from bslam.evaluation.align import wrap_angle
 
 DELTA_M: Final = 1.0  # true path between the two poses of a pair
-ROUNDING_M: Final = 1e-9  # fifty steps of 2 cm are a metre, however their sum is rounded
 
 
 class _Motions(NamedTuple):
@@ -44,7 +43,7 @@ def _ends(truth: NDArray[np.float64]) -> list[int]:
     """Rows at which one pair ends and the next begins."""
     steps_m = np.hypot(*np.diff(truth[:, :2], axis=0).T)
     path_m = np.concatenate([[0.0], np.cumsum(steps_m)])
-    ends = np.searchsorted(path_m, path_m + DELTA_M - ROUNDING_M).tolist()
+    ends = np.searchsorted(path_m, path_m + DELTA_M).tolist()
     rows = [0] if len(truth) else []
     while rows and ends[rows[-1]] < len(path_m):
         rows.append(ends[rows[-1]])
