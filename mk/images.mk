@@ -10,7 +10,7 @@ KINDS ?= firmware/models/own_room.h
 # What boards may use.
 PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
-# The sizes of the host's largest build (host_sim/bslam_build.py), so that a board with much memory answers as it does,
+# The sizes of the host's largest build (bslam_build.py), so that a board with much memory answers as it does,
 # the front end for pictures, turns seen, and the smoother.
 HOST_SIZES := -DROBOT_VISION=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128

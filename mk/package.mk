@@ -1,7 +1,8 @@
 # The Python package: its files to hand on, and the hashes of what it stands on.
 
 UV := build/lock/bin/uv
-PIP_COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate --no-header
+PIP_COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+    --no-annotate --no-header
 
 .PHONY: lock package
 lock: ## write requirements*.lock.txt: the pins of requirements*.txt with hashes; after each change there
