@@ -1,4 +1,5 @@
-# The site: one folder of files for any web server, or to read from the disk (then without search). It asks nobody else.
+# The site: one folder of files for any web server, or to read from the disk (then without search). It asks
+# nobody else.
 
 SITE_VENV := build/site/venv
 SITE_STAMP := $(SITE_VENV)/stamp
@@ -6,7 +7,7 @@ SITE_PAGES := build/site/docs
 PLAYGROUND_HTML := out/playground/index.html
 
 .PHONY: site
-site: $(SITE_STAMP) $(if $(wildcard mk/playground.mk),playground) ## the site in out/site: documents, headers, notebooks, pictures, playground
+site: $(SITE_STAMP) playground ## documents, headers, notebooks, pictures, playground as a site: out/site
 	@$(SITE_VENV)/bin/python -m tools.site_pages $(SITE_PAGES)
 	@test ! -f $(PLAYGROUND_HTML) || install -D $(PLAYGROUND_HTML) $(SITE_PAGES)/playground/index.html
 	@NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs --quiet build --strict
