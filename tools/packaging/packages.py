@@ -57,16 +57,11 @@ def with_flat_names(files: Files) -> Files:
     return named
 
 
-def examples(root: Path, name: str) -> Files:
-    """Examples for one system, if there are any."""
-    return {place: (root / place).read_bytes() for place in tracked(root, f"examples/{name}")}
-
-
 def arduino(root: Path) -> Files:
     """A library in Arduino's layout: sources below src, and there the headers that it looks for."""
     files = below(read(root, ARDUINO), f"{ARDUINO}/", "") | read(root, "LICENSE")
     files |= with_flat_names(below(read(root, *FOLDERS), "firmware", "src"))
-    files |= below(examples(root, "arduino"), "examples/arduino", "examples")
+    files |= below(read(root, "examples/arduino"), "examples/arduino", "examples")
     return {f"bslam/{name}": text for name, text in files.items()}
 
 
@@ -76,7 +71,7 @@ def platformio(root: Path) -> Files:
 
 def esp_idf(root: Path) -> Files:
     own = ("CMakeLists.txt", "Kconfig", "idf_component.yml", "firmware/Kconfig", "firmware/cmake")
-    return read(root, *own, "LICENSE", "README.md", *FOLDERS) | examples(root, "esp_idf")
+    return read(root, *own, "LICENSE", "README.md", "examples/esp_idf", *FOLDERS)
 
 
 def zip_of(files: Files) -> bytes:

@@ -109,7 +109,9 @@ def test_arduino_sketch_compiles_as_cxx_by_the_headers_that_arduino_finds(
 
 def test_arduino_sketches_include_what_arduino_finds(arduino: Path) -> None:
     own = {path.name for path in (arduino / "src").iterdir() if path.suffix == ".h"}
-    for sketch in arduino.glob("examples/*/*.ino"):
+    sketches = list(arduino.glob("examples/*/*.ino"))
+    assert sketches
+    for sketch in sketches:
         assert sketch.stem == sketch.parent.name  # else Arduino does not open it
         included = re.findall(
             r'#include [<"](.*(?:bslam|vision|link).*)[>"]', sketch.read_text(encoding="utf-8")

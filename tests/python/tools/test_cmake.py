@@ -72,6 +72,19 @@ def test_the_toolchain_file_builds_for_a_core(tmp_path):
     assert "Tag_CPU_arch: v6S-M" in shown
 
 
+def test_the_toolchain_file_builds_cpp_for_the_same_core(tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(user CXX)\nadd_library(user user.cpp)\n"
+    )
+    (tmp_path / "user.cpp").write_text("float half(float x) { return x / 2; }\n")
+    toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
+    cmake("-S", tmp_path, "-B", tmp_path, f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DBSLAM_CORE=m4f")
+    cmake("--build", tmp_path)
+    words = ["arm-none-eabi-readelf", "-A", tmp_path / "libuser.a"]
+    shown = subprocess.run(words, capture_output=True, text=True).stdout
+    assert "Tag_ABI_VFP_args: VFP registers" in shown
+
+
 def test_a_core_that_does_not_exist_is_refused(tmp_path):
     toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
     words = [
