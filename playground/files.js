@@ -2,9 +2,9 @@
 // Files that were dropped or chosen, as texts by their names.
 
 const LOG_FILES = ["odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml"];
-const FILE_BYTES_MAX = 256 << 20;
+const TEXT_MB_MAX = 256;
 
-/** Every file of a drop, those in its folders too, and what to call them together. Throws PageError. */
+/** The files of a drop, or those of its first folder, and what to call them together. Throws PageError. */
 async function droppedFiles(transfer) {
     const files = [...transfer.files];
     // Asked for at once: after the first wait the browser has forgotten what was dropped.
@@ -25,7 +25,7 @@ async function droppedFiles(transfer) {
     }
 }
 
-/** The files of a dropped folder itself: by handles, which work without a server, or where there are none. */
+/** The files of a dropped folder, not of folders in it: by handles, which work without a server, or where there are none. */
 async function filesIn(folder, handles) {
     const handle = handles.find((one) => one.kind === "directory");
     const found = [];
@@ -66,18 +66,30 @@ async function logTexts(files) {
     return texts;
 }
 
-async function textOf(file) {
-    if (file.size > FILE_BYTES_MAX) {
-        throw new PageError(`${file.name}: it holds more than 256 MB of text; allowed: at most that`);
-    }
+async function textOf(file, megabytesMax = TEXT_MB_MAX) {
     try {
         const stream = file.name.endsWith(".gz")
             ? file.stream().pipeThrough(new DecompressionStream("gzip"))
             : file.stream();
-        return new TextDecoder("utf-8", { fatal: true }).decode(await new Response(stream).arrayBuffer());
+        return await decoded(stream.getReader(), megabytesMax);
     } catch (error) {
-        throw new PageError(
-            `${file.name}: cannot be read: ${error.message}; allowed: UTF-8 text, gzipped if named .gz`,
-        );
+        const allowed = `at most ${megabytesMax} MB of UTF-8 text, gzipped if named .gz`;
+        throw new PageError(`${file.name}: cannot be read: ${error.message}; allowed: ${allowed}`);
     }
+}
+
+/** The text that comes, counted while it does: a small packed file may hold any amount. */
+async function decoded(reader, megabytesMax) {
+    const decoder = new TextDecoder("utf-8", { fatal: true });
+    let text = "";
+    let bytes = 0;
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+        bytes += part.value.byteLength;
+        if (bytes > megabytesMax * 2 ** 20) {
+            await reader.cancel();
+            throw new Error("it holds too much text");
+        }
+        text += decoder.decode(part.value, { stream: true });
+    }
+    return text + decoder.decode();
 }

@@ -5,7 +5,7 @@ const PLOT_ROWS_MAX = 4000;
 
 function bindFiles() {
     element("files").addEventListener("change", (event) => {
-        loadFiles("log", [...event.target.files]);
+        loadFiles({ name: "log", files: [...event.target.files] });
         event.target.value = ""; // so that the same may be chosen again
     });
     for (const name of ["dragenter", "dragover"]) {
@@ -20,31 +20,34 @@ function bindFiles() {
     window.addEventListener("drop", (event) => {
         event.preventDefault();
         document.body.classList.remove("dropping");
-        orSay(async () => {
-            const { name, files } = await droppedFiles(event.dataTransfer);
-            await loadFiles(name, files);
-        });
+        loadFiles(droppedFiles(event.dataTransfer));
     });
 }
 
-/** Checks a log and runs it. What is none is named, and the page stays as it is. */
-async function loadFiles(name, files) {
-    await orSay(async () => {
+/** Checks a log and runs it. given: its name and files, or their promise. What is none is named, and the
+ * page stays as it is. */
+async function loadFiles(given) {
+    await asNewest(async (isNewest) => {
+        const { name, files } = await given;
         const texts = await logTexts(files);
+        if (!isNewest()) {
+            return;
+        }
         say(`${name}: is checked`);
         await breath();
         const checked = await checkLog(name, texts);
-        await runLog(checked, usualChoices(checked.log));
+        if (isNewest()) {
+            await runLog(checked, usualChoices(checked.log));
+        }
     });
 }
 
 async function runLog(checked, choices) {
-    await orSay(async () => {
-        const run = (page.newestRun = {});
+    await asNewest(async (isNewest) => {
         say(`${checked.log.name}: runs`);
         const replay = await new Replay(checked.log, { ...choices, recovery: false }).run();
-        if (run !== page.newestRun) {
-            return; // other choices were made meanwhile
+        if (!isNewest()) {
+            return;
         }
         page.shown = { checked, replay, result: evaluate(replay) };
         page.roomChoices = page.roomChoices || readChoices();
@@ -55,15 +58,27 @@ async function runLog(checked, choices) {
     });
 }
 
-/** Does it; a PageError becomes the page's message. */
-async function orSay(action) {
+/** Does it in place of what is under way; the action asks after each wait whether it is the newest still.
+ * Its PageError becomes the page's message, and the choices are again those of the log that is shown. */
+async function asNewest(action) {
+    const run = (page.newestRun = {});
+    const isNewest = () => page.newestRun === run;
     try {
-        await action();
+        await action(isNewest);
     } catch (error) {
         if (!(error instanceof PageError)) {
             throw error;
         }
-        say(error.message);
+        if (isNewest()) {
+            say(error.message);
+            if (page.shown) {
+                writeChoices(page.shown.replay.choices);
+            }
+        }
+    } finally {
+        if (isNewest()) {
+            page.newestRun = null;
+        }
     }
 }
 
@@ -73,7 +88,8 @@ function writeChoices(choices) {
 
 function backToRoom() {
     writeChoices(page.roomChoices);
-    page.shown = page.roomChoices = null;
+    page.shown = page.roomChoices = page.newestRun = null;
+    say("");
     setMode(false);
     show();
     wake();

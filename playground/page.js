@@ -22,7 +22,7 @@ const page = {
     drive: null,
     shown: null, // a log in place of the room
     roomChoices: null, // to go back to
-    newestRun: null, // of a log
+    newestRun: null, // of a log, while it is under way
     isPlaying: true,
     held: new Set(),
     isAwake: false, // steps are taken as time goes by
@@ -51,6 +51,9 @@ function restart() {
     page.owedSteps = 0;
     for (let step = 0; step < FIRST_STEPS; step++) {
         page.drive.step(null);
+    }
+    if (!page.newestRun) {
+        say(""); // but what a log is about to do stays
     }
     show();
 }
@@ -197,7 +200,7 @@ function isTyping(target) {
 }
 
 function onKeyDown(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
+    if (page.shown || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
         return;
     }
     if (event.code in KEYS) {

@@ -274,6 +274,78 @@ def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
     assert poses[-1] == last.tolist()
 
 
+MEANWHILE = {
+    "back while it runs": ("runLog(page.shown.checked, other)", "element('room').click()"),
+    "back while it is checked": ("loadFiles(again)", "element('room').click()"),
+    "a bad drop while it runs": ("runLog(page.shown.checked, other)", "loadFiles(bad)"),
+    "a bad drop, then choices": ("loadFiles(bad)", "runLog(page.shown.checked, other)"),
+}
+
+
+def test_playground_what_is_asked_last_stays(playground, tmp_path):
+    texts = texts_of(folder_of(made_up(seconds=10.0), tmp_path / "drive"))
+    shown = {}
+    for name, (first, then) in MEANWHILE.items():
+        playground.evaluate(DROP, texts)
+        expect(playground.locator("#title")).to_have_text("log: 0 findings")
+        shown[name] = playground.evaluate(
+            f"""async texts => {{
+                const files = Object.entries(texts).map(([name, text]) => new File([text], name));
+                const again = {{ name: "again", files }};
+                const bad = {{ name: "bad", files: [new File([""], "holiday.csv")] }};
+                const other = {{ ...readChoices(), filter: "standard" }};
+                writeChoices(other);
+                await Promise.all([{first}, {then}]);
+                const texted = ["title", "message"].map(id => element(id).textContent.slice(0, 15));
+                return [...texted, element("filter").value, page.shown?.replay.choices.filter];
+            }}""",
+            texts,
+        )
+        playground.evaluate("page.shown && backToRoom()")
+        expect(playground.locator("#message")).to_be_hidden()
+    assert shown == {
+        "back while it runs": ["A robot in a ro", "", "invariant", None],
+        "back while it is checked": ["A robot in a ro", "", "invariant", None],
+        "a bad drop while it runs": ["log: 0 findings", "holiday.csv: no", "invariant", "invariant"],
+        "a bad drop, then choices": ["log: 0 findings", "", "standard", "standard"],
+    }
+
+
+def test_playground_a_log_leaves_the_keys_to_the_browser(playground, tmp_path):
+    pressed = """() => ["Space", "ArrowDown"].map(code => document.body.dispatchEvent(
+        new KeyboardEvent("keydown", { code, bubbles: true, cancelable: true })))"""
+    playground.evaluate(DROP, texts_of(folder_of(made_up(seconds=10.0), tmp_path / "drive")))
+    expect(playground.locator("#title")).to_have_text("log: 0 findings")
+    assert playground.evaluate(pressed) == [True, True]
+    assert playground.evaluate("[page.isPlaying, element('self').checked]") == [False, True]
+    playground.get_by_role("button", name="Back to the room").click()
+    assert playground.evaluate(pressed) == [False, False]
+
+
+def test_playground_a_message_goes_when_the_room_starts_anew(playground):
+    for anew in ("element('restart').click()", "onChoice()"):
+        playground.evaluate(DROP, {"holiday.csv": "a,b"})
+        expect(playground.locator("#message")).to_contain_text("holiday.csv: no file of a log")
+        playground.evaluate(anew)
+        expect(playground.locator("#message")).to_be_hidden()
+
+
+def test_playground_counts_the_text_that_a_packed_file_holds(functions):
+    said = functions.evaluate(
+        """async ([text, packed]) => {
+            const file = new File([new Uint8Array(packed)], "truth.csv.gz");
+            const whole = (await textOf(file)) === text;
+            return [whole, await textOf(file, 1).catch(error => error.message)];
+        }""",
+        [text := "\u00b5" * 600_000, list(gzip.compress(text.encode()))],
+    )
+    assert said == [
+        True,
+        "truth.csv.gz: cannot be read: it holds too much text; allowed: at most 1 MB of UTF-8 text, "
+        "gzipped if named .gz",
+    ]
+
+
 def without(name):
     return lambda texts: {key: text for key, text in texts.items() if key != name}
 
