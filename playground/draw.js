@@ -144,11 +144,16 @@ class MapView {
             this.pen.moveTo(px, py - 3);
             this.pen.lineTo(px, py + 3);
         });
-        this.write(beacon.name, px - 8, py - 8, colour, "right");
+        this.write(beacon.name, px - 8, py - 8, beacon.confirmed ? colour : this.colours.ink, "right");
     }
 
+    /** With a rim of paper, so that it can be read on a line. */
     write(text, px, py, colour, side = "left") {
         this.pen.textAlign = side;
+        this.pen.strokeStyle = this.colours.paper;
+        this.pen.lineWidth = 3;
+        this.pen.lineJoin = "round";
+        this.pen.strokeText(text, px, py);
         this.pen.fillStyle = colour;
         this.pen.fillText(text, px, py);
     }

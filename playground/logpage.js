@@ -178,7 +178,7 @@ function logFigures(replay, result) {
         ["time", `${lastOf(result.errors, 0).toFixed(1)} s`],
         [
             "last pose x, y, heading",
-            `${last.x.toFixed(2)}, ${last.y.toFixed(2)} m, ${last.theta.toFixed(2)} rad`,
+            `${last.x.toFixed(2)}, ${last.y.toFixed(2)}\u00a0m, ${last.theta.toFixed(2)}\u00a0rad`,
         ],
         ["beacons in the map (room for 80)", String(result.beacons.filter((one) => one.confirmed).length)],
         [

@@ -10,9 +10,17 @@ function drawPlots(canvas, rows) {
     const half = 0.5 * height;
     const times = rows.length ? [rows[0][0], Math.max(rows[rows.length - 1][0], rows[0][0] + 1)] : [0, 1];
     const highest = Math.max(0.1, ...rows.map((row) => row[1]).filter(Number.isFinite));
-    const error = { title: "error of the position, m", column: 1, low: 0, high: 1.08 * highest, marks: [] };
+    const titled = (column, name, meaning) =>
+        name + (rows.some((row) => Number.isFinite(row[column])) ? meaning : ": not known without its truth");
+    const error = {
+        title: titled(1, "error of the position", ", m"),
+        column: 1,
+        low: 0,
+        high: 1.08 * highest,
+        marks: [],
+    };
     const nees = {
-        title: "NEES (3 is right, 95 % below the dashes)",
+        title: titled(2, "NEES", " (3 is right, 95 % below the dashes)"),
         column: 2,
         low: -1.3,
         high: 3.3,

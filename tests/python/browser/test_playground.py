@@ -316,6 +316,7 @@ def test_playground_a_log_leaves_the_keys_to_the_browser(playground, tmp_path):
         new KeyboardEvent("keydown", { code, bubbles: true, cancelable: true })))"""
     playground.evaluate(DROP, texts_of(folder_of(made_up(seconds=10.0), tmp_path / "drive")))
     expect(playground.locator("#title")).to_have_text("log: 0 findings")
+    expect(playground.locator("#help")).not_to_contain_text("arrow keys", use_inner_text=True)
     assert playground.evaluate(pressed) == [True, True]
     assert playground.evaluate("[page.isPlaying, element('self').checked]") == [False, True]
     playground.get_by_role("button", name="Back to the room").click()
