@@ -25,7 +25,7 @@ async function droppedFiles(transfer) {
     }
 }
 
-/** The files of a dropped folder, not of folders in it: by handles, which work without a server, if there are. */
+/** The files of a dropped folder, not of folders in it: by handles, if there are: they need no server. */
 async function filesIn(folder, handles) {
     const handle = handles.find((one) => one.kind === "directory");
     const found = [];

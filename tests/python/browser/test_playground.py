@@ -276,7 +276,14 @@ def test_playground_other_choices_run_the_log_anew(playground, tmp_path):
 
 MEANWHILE = {
     "back while it runs": ("runLog(page.shown.checked, other)", "element('room').click()"),
-    "back while it is checked": ("loadFiles(again)", "element('room').click()"),
+    "back while it is read": ("loadFiles(again)", "element('room').click()"),
+    "back while it is checked": (
+        "loadFiles(again)",
+        """new MutationObserver((_, observer) => {
+            observer.disconnect();
+            element("room").click();
+        }).observe(element("message"), { childList: true })""",
+    ),
     "a bad drop while it runs": ("runLog(page.shown.checked, other)", "loadFiles(bad)"),
     "a bad drop, then choices": ("loadFiles(bad)", "runLog(page.shown.checked, other)"),
 }
@@ -305,6 +312,7 @@ def test_playground_what_is_asked_last_stays(playground, tmp_path):
         expect(playground.locator("#message")).to_be_hidden()
     assert shown == {
         "back while it runs": ["A robot in a ro", "", "invariant", None],
+        "back while it is read": ["A robot in a ro", "", "invariant", None],
         "back while it is checked": ["A robot in a ro", "", "invariant", None],
         "a bad drop while it runs": ["log: 0 findings", "holiday.csv: no", "invariant", "invariant"],
         "a bad drop, then choices": ["log: 0 findings", "", "standard", "standard"],
