@@ -11,7 +11,7 @@ function drawPlots(canvas, rows) {
     const times = rows.length ? [rows[0][0], Math.max(rows[rows.length - 1][0], rows[0][0] + 1)] : [0, 1];
     const highest = Math.max(0.1, ...rows.map((row) => row[1]).filter(Number.isFinite));
     const titled = (column, name, meaning) =>
-        name + (rows.some((row) => Number.isFinite(row[column])) ? meaning : ": not known without its truth");
+        name + (rows.some((row) => Number.isFinite(row[column])) ? meaning : ": no truth");
     const error = {
         title: titled(1, "error of the position", ", m"),
         column: 1,
