@@ -11,7 +11,7 @@ class BslamError(Exception):
     """
 
 
-def did_you_mean(word: str, allowed: Iterable[str]) -> str:
+def did_you_mean(word: object, allowed: Iterable[str]) -> str:
     """What to append to a message about `word`: "; did you mean 'NAME'?" with the nearest allowed name.
 
     "" where none is near. Case and "-" for "_" count as no difference.
@@ -21,5 +21,5 @@ def did_you_mean(word: str, allowed: Iterable[str]) -> str:
     return f"; did you mean {by_plain_name[nearest[0]]!r}?" if nearest else ""
 
 
-def _plain(name: str) -> str:
-    return name.casefold().replace("-", "_")
+def _plain(name: object) -> str:
+    return str(name).casefold().replace("-", "_")

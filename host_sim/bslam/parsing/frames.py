@@ -19,16 +19,19 @@ from bslam.errors import BslamError
 def texts_of(name: str, frame: Any) -> dict[str, list[str]]:
     """By column the fields of a dataframe; a missing value (None, NaN, NA) is an empty one, True is 1.
 
-    `name` is for messages. Raises BslamError for what is no dataframe.
+    `name` is for messages. Raises BslamError for what is no dataframe, and for a label that is no text.
     """
     try:
         known = nw.from_native(frame)
+        eager = known.collect() if isinstance(known, nw.LazyFrame) else known
     except (TypeError, NarwhalsError) as error:
-        kind = type(frame).__name__
+        kind, said = type(frame).__name__, " ".join(str(error).split())
         allowed = "a dataframe of pandas, polars, pyarrow or another library that narwhals knows"
-        raise BslamError(f"{name}: {kind}: {error}; allowed: {allowed}") from error
-    eager = known.collect() if isinstance(known, nw.LazyFrame) else known
-    return {str(column): _texts(eager[column]) for column in eager.columns}
+        raise BslamError(f"{name}: {kind}: {said}; allowed: {allowed}") from error
+    for column in eager.columns:
+        if not isinstance(column, str):  # pandas numbers them where nobody names them
+            raise BslamError(f"{name}: column label {column!r} is not allowed; allowed: texts")
+    return {column: _texts(eager[column]) for column in eager.columns}
 
 
 def _texts(column: nw.Series[Any]) -> list[str]:

@@ -148,12 +148,33 @@ def test_what_is_wrong_is_said_as_of_a_file(table, column, change, allowed, tmp_
             "robot 0.3: allowed: a Robot, a mapping of its",
         ),
         (lambda o, s: Log.from_dataframe(o, s, robot="no.toml"), "no.toml: cannot be read"),
+        (
+            lambda o, s: Log.from_dataframe(o, s, robot=ROBOT | {1: 2}),
+            "robot, key 1: no such key; allowed: w",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(pd.DataFrame(o.to_numpy()), s, robot=ROBOT),
+            "odometry: column label 0 is not allowed; allowed: texts$",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(pd.concat({"a": o}, axis=1), s, robot=ROBOT),
+            r"odometry: column label \('a', 'time_us'\) is not allowed; allowed: texts$",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(pd.concat([o, o], axis=1), s, robot=ROBOT),
+            "odometry: DataFrame: .*'left_m' 2 times.*; allowed: a dataframe",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(pl.from_pandas(o).lazy().select("nope"), s, robot=ROBOT),
+            'odometry: LazyFrame: .*"nope".*; allowed: a dataframe',
+        ),
     ],
 )
 def test_what_cannot_be_a_log_is_named(call, message) -> None:
     tables = columns()
-    with pytest.raises(BslamError, match=message):
+    with pytest.raises(BslamError, match=message) as refusal:
         call(pd.DataFrame(tables["odometry"]), pd.DataFrame(tables["sightings"]))
+    assert "\n" not in str(refusal.value)
 
 
 def test_robot_may_be_of_any_kind(tmp_path) -> None:
