@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import NoneType
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -53,11 +54,11 @@ class RunWords(TypedDict, total=False):
     noise: str | None
     sigma_mps: float | None
     """Wheel-speed sigma told to the filter, m/s."""
-    parameters: Mapping[str, Number]
+    parameters: Mapping[str, Number] | None
     """Settings of the core by name: `Slam.parameters()` lists them. They win over all else."""
     known_map: bool
     """The log's true beacons are given to the filter."""
-    kept_map: str | None
+    kept_map: str | Path | None
     """Path of a map to start in, at a place that nobody knows."""
     frozen: bool
     recovery: str | None
@@ -68,6 +69,11 @@ class RunWords(TypedDict, total=False):
     real: str
     target: str
     """ "host", "qemu:BOARD" or "serial:DEVICE"."""
+
+
+_OF_THE_FILTER = ("filter", "known_map", "kept_map", "frozen", "recovery", "target")
+"""Words that an algorithm of one's own hears nothing of."""
+_TEXTS = ("association", "kept_map", "target")
 
 
 @dataclass(frozen=True)
@@ -122,16 +128,11 @@ def check(log: Log) -> Report:
 
 def run(log: Log, algorithm: Callable[..., Algorithm] | None = None, **words: Unpack[RunWords]) -> Run:
     """Run the filter over a log, as `bslam replay csv` does with options of these names. See `Log.run`."""
-    for word in words:
-        if word not in RunWords.__annotations__:
-            allowed = ", ".join(RunWords.__annotations__)
-            near = did_you_mean(word, [*RunWords.__annotations__]) or _perhaps_a_setting(word)
-            raise BslamError(f"option {word!r} does not exist; allowed: {allowed}{near}")
+    if isinstance(words.get("kept_map"), Path):
+        words["kept_map"] = str(words["kept_map"])
+    _ensure_words(words, algorithm)
     given: dict[str, Any] = {**words, "sensor": "recorded", "map_align": "rigid"}
-    parameters = given.setdefault("parameters", {})
-    if not isinstance(parameters, Mapping):
-        raise BslamError(f"parameters {parameters!r}: allowed is a mapping, names to numbers")
-    given["parameters"] = tuple(parameters.items())
+    given["parameters"] = tuple((words.get("parameters") or {}).items())
     options = options_for(what_it_says(log), given)
     if algorithm is None:
         trace = run_log(log, options)
@@ -141,6 +142,22 @@ def run(log: Log, algorithm: Callable[..., Algorithm] | None = None, **words: Un
             options = replace(options, association="known")
         trace = run_algorithm(log, options, maker_of(algorithm), lambda step: None)
     return Run(log, options, trace, evaluate(log, trace, options))
+
+
+def _ensure_words(words: RunWords, algorithm: object) -> None:
+    """Raise BslamError for a word that is none, that counts for nothing, or of another type."""
+    for word, value in words.items():
+        if word not in RunWords.__annotations__:
+            allowed = ", ".join(RunWords.__annotations__)
+            near = did_you_mean(word, [*RunWords.__annotations__]) or _perhaps_a_setting(word)
+            raise BslamError(f"option {word!r} does not exist; allowed: {allowed}{near}")
+        if algorithm is not None and word in _OF_THE_FILTER and value:
+            allowed = ", ".join(one for one in RunWords.__annotations__ if one not in _OF_THE_FILTER)
+            raise BslamError(f"option {word!r} is of the filter alone; allowed with an algorithm: {allowed}")
+        if word in _TEXTS and not isinstance(value, (str, NoneType)):
+            raise BslamError(f"{word}: {value!r} is not allowed; allowed: a text, or None")
+        if word == "parameters" and not isinstance(value, (Mapping, NoneType)):
+            raise BslamError(f"parameters {value!r}: allowed is a mapping, names to numbers")
 
 
 def _perhaps_a_setting(word: str) -> str:

@@ -268,8 +268,8 @@ class Log:
     ) -> bslam.Run:
         """Run the filter over the log, as `bslam replay csv` does with options of these names.
 
-        algorithm: a class of your own (docs/PLUGIN.md) to run in its place. Raises BslamError for what is no
-        option, or no value of one.
+        algorithm: a class of your own (docs/PLUGIN.md) to run in its place, without the options that are of
+        the filter alone. Raises BslamError for what is no option, or no value of one.
         """
         return bslam.run(self, algorithm, **words)
 

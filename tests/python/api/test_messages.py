@@ -1,5 +1,7 @@
 """Every message says what is allowed, and the nearest right name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,10 @@ def test_a_misspelt_name_is_met_with_the_nearest(call, name) -> None:
             lambda: bslam.simulate("paper_room", seed="x"),
             "seed: 'x' is not allowed; allowed: an integer from 0",
         ),
+        (lambda: DRIVE.run(association=5), "association: 5 is not allowed; allowed: a text, or None"),
+        (lambda: DRIVE.run(target=5), "target: 5 is not allowed; allowed: a text, or None"),
+        (lambda: DRIVE.run(kept_map=Path("no.bslam")), "no.bslam: "),
+        (lambda: DRIVE.run(kept_map=5), "kept_map: 5 is not allowed; allowed: a text, or None"),
         (lambda: DRIVE.run(frozen=True), "frozen: no map; allowed: with kept_map"),
         (lambda: DRIVE.run(kept_map="a.bslam", known_map=True), "with known_map; allowed: one of them"),
         (lambda: DRIVE.run(association="known:2"), "'2' is not a rate; allowed: known, known:RATE with"),

@@ -106,6 +106,28 @@ def test_an_algorithm_of_ones_own_is_judged_alike() -> None:
         DRIVE.run(type("Half", (), {"reset": 0, "odometry": 0, "pose": 0}))
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"filter": "smoother"},
+        {"known_map": True},
+        {"kept_map": "a.bslam"},
+        {"frozen": True},
+        {"recovery": "carried"},
+        {"target": "qemu:m33"},
+    ],
+)
+def test_an_algorithm_is_not_told_what_is_of_the_filter(words) -> None:
+    (word,) = words
+    with pytest.raises(BslamError, match=f"option '{word}' is of the filter alone; allowed .*: observation"):
+        DRIVE.run(Standstill, **words)
+
+
+def test_none_is_as_left_out() -> None:
+    words = dict.fromkeys(bslam.RunWords.__annotations__)
+    assert DRIVE.run(Standstill, **words).options == DRIVE.run(Standstill).options
+
+
 def test_plot_shows_path_map_ellipses_error_and_nees() -> None:
     figure = bslam.plot(DRIVE.run(association="known"))
     room, error, nees = figure.axes
