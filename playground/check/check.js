@@ -9,6 +9,7 @@ const DELAY_S = 0.08;
 const DELAY_ROWS = 2;
 const LEAD_S = 0.3; // of commands before the motion
 const BLIND = "all else: it takes a robot that moves and beacons with identities, seen again within a second";
+const HANGING = "all else: it takes sightings that change";
 const STRAIGHT = "signs and scale of the turn: it hardly turns while beacons are seen";
 const LEFT_TO_HOST = "scales, mount, noise, exchanged identities: `bslam check` tests them";
 
@@ -26,6 +27,10 @@ async function checkDrive(log) {
     let { drive, flow, factors } = inSi(log, NO_FACTORS, findings);
     if (!flow) {
         return { findings, untested: [BLIND] };
+    }
+    const still = hangingDetector(drive);
+    if (still.length) {
+        return { findings: [...findings, ...still], untested: [HANGING] };
     }
     const untested = Math.abs(flow.turn) > 2 * flow.turnError ? [LEFT_TO_HOST] : [STRAIGHT, LEFT_TO_HOST];
     const signed = signsOf(flow);
@@ -85,6 +90,22 @@ function outsideOdometry(log) {
             what: `${out} of ${seen.length} sightings are before or after odometry`,
             sure: `they run from ${seen[0]} to ${seen.at(-1)} us, odometry from ${first} to ${last}`,
             mend: "let one clock stamp both, or shift time_us",
+        },
+    ];
+}
+
+/** Sightings that stay the same, of a robot that moves. */
+function hangingDetector(drive) {
+    const different = new Set(drive.ids.map((id, row) => `${id},${drive.bearing[row]},${drive.range[row]}`));
+    if (different.size !== new Set(drive.ids).size) {
+        return [];
+    }
+    return [
+        {
+            kind: "sightings",
+            what: "sightings do not change while odometry moves",
+            sure: "each is equal to the first of its beacon",
+            mend: "a detector that hangs: let it look anew for each frame",
         },
     ];
 }

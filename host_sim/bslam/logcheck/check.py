@@ -21,6 +21,7 @@ _SLIPS_MAX: Final = 3
 _BLIND: Final = (
     "all else: it takes a robot that moves and beacons with identities, seen again within a second"
 )
+_HANGING: Final = "all else: it takes sightings that change"
 _STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons are seen"
 _NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
 
@@ -46,6 +47,8 @@ def check_log(log: Log) -> Report:
     drive, flow, factors = _in_si(log, factors, findings)
     if flow is None:
         return Report(log.name, findings, [_BLIND])
+    if still := [*verdict.hanging(drive)]:
+        return Report(log.name, [*findings, *still], [_HANGING])
     signed, shown = signs(flow), flow
     untested = [] if abs(flow.turn) > 2.0 * flow.turn_error else [_STRAIGHT]
     if signed != Factors():

@@ -67,6 +67,20 @@ def outside(log: Log) -> Iterator[Finding]:
         )
 
 
+def hanging(drive: Drive) -> Iterator[Finding]:
+    """Sightings that stay the same, of a robot that moves."""
+    seen = drive.seen
+    columns = (seen.label, seen.bearing_rad, np.nan_to_num(seen.range_m))
+    if len(np.unique(np.column_stack(columns), axis=0)) == len(np.unique(seen.label)):
+        yield Finding(
+            "sightings",
+            "sightings do not change while odometry moves",
+            "each is equal to the first of its beacon",
+            "a detector that hangs: let it look anew for each frame",
+            {"sightings": len(seen.label)},
+        )
+
+
 def delay(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     """Sightings that come late, or early, beyond what is told."""
     found, gain = solution.delay, solution.delay_gain
@@ -99,11 +113,11 @@ def scales(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     size, by = (1.0, "the ranges alone") if placed is None else (placed.scale / unit, placed.what)
     usual = (_WAY_OFF_COMMANDED, _TURN_OFF_COMMANDED) if drive.is_commanded else (_WAY_OFF, _TURN_OFF)
     way, turn = solution.way, solution.turn
-    if abs(way.value / flow.way - 1.0) < _AGREE:
+    if abs(way.value - flow.way) < _AGREE * abs(flow.way):
         limit = usual[0] + way.cover + (_SIZE_UNKNOWN if placed is None else 0.0)
         own = Estimate(size * way.value, way.error)
         yield from _scale("forward_scale", "way", own, limit, by, _sums_picture(solution, 0, "way, m"))
-    if abs(turn.value / flow.turn - 1.0) < _AGREE:
+    if abs(turn.value - flow.turn) < _AGREE * abs(flow.turn):
         nearer = min((turn.value, flow.turn), key=lambda one: abs(one - 1.0))
         own, picture = Estimate(nearer, turn.error), _sums_picture(solution, 1, "turn, rad")
         yield from _scale("turn_scale", "turn", own, usual[1] + turn.cover, "bearings", picture)

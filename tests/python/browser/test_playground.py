@@ -463,6 +463,12 @@ def turned(log):
     return with_sightings(log, bearing_rad=yaw)
 
 
+def hanging(log):
+    s = log.sightings
+    first = [int(np.argmax(s.beacon_id == one)) for one in s.beacon_id]
+    return with_sightings(log, bearing_rad=s.bearing_rad[first], range_m=s.range_m[first])
+
+
 SPOILT_LOGS = {
     "mirrored": mirrored,
     "mirrored, no truth": lambda log: replace(mirrored(log), beacons=None),
@@ -474,6 +480,7 @@ SPOILT_LOGS = {
     "millimetres and mirrored": lambda log: mirrored(in_mm(log)),
     "odometry in centimetres": lambda log: with_odometry(log, a=1e2 * log.odometry.a, b=1e2 * log.odometry.b),
     "no identities": lambda log: with_sightings(log, beacon_id=np.full_like(log.sightings.beacon_id, -1)),
+    "a detector that hangs": hanging,
     "another time": lambda log: with_sightings(log, time_us=log.sightings.time_us + 10**9),
     "at rest": lambda log: with_odometry(log, a=0 * log.odometry.a, b=0 * log.odometry.b),
     "good": lambda log: log,

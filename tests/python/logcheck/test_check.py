@@ -50,6 +50,18 @@ def swapped(log):
     return with_odometry(log, a=log.odometry.b, b=log.odometry.a)
 
 
+@pytest.mark.parametrize("ranges", [True, False])
+def test_check_a_detector_that_hangs_is_named(ranges):
+    log = first_steps(made_up(), 200)
+    seen = log.sightings
+    same = {"range_m": np.full(len(seen.time_us), 2.0 if ranges else np.nan)}
+    one = the_one(with_sightings(log, bearing_rad=np.full(len(seen.time_us), 0.1), **same))
+    assert one.what == "sightings do not change while odometry moves" and "hangs" in one.mend
+    moved = np.where(np.arange(len(seen.time_us)) == 100, 0.2, 0.1)
+    findings, _ = found(with_sightings(log, bearing_rad=moved, **same))
+    assert "hangs" not in str(findings)
+
+
 def test_check_mirrored_bearings_are_told_from_swapped_wheels_by_the_map():
     one = the_one(mirrored(made_up()))
     assert one.kind == "mirrored bearings"
