@@ -6,10 +6,10 @@ from pathlib import Path
 import setuptools
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "host_sim"))
-from bslam_build import BuildExtensions, shipped
+from bslam_build import IS_ABI3, BuildExtensions, shipped
 
 setuptools.setup(
     ext_modules=shipped(),
     cmdclass={"build_ext": BuildExtensions},
-    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}} if IS_ABI3 else {},
 )

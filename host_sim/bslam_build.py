@@ -28,7 +28,8 @@ from setuptools.modified import newer_group
 ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE_DIR = ROOT / "firmware"
 CAMERA_DIR = ROOT / "host_sim" / "bslam" / "world" / "camera"
-BUILDS: dict[str, Any] = runpy.run_path(str(ROOT / "host_sim" / "bslam" / "core" / "builds.py"))
+BUILDS_FILE = ROOT / "host_sim" / "bslam" / "core" / "builds.py"
+BUILDS: dict[str, Any] = runpy.run_path(str(BUILDS_FILE))
 """Names and sizes, read as a file: to import the package takes numpy, and to build it must not."""
 
 SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision"), "link": ("base", "link")}
@@ -74,6 +75,8 @@ FLAGS = [
 ]
 CAMERA_FLAGS = ["-fno-math-errno", "-fno-trapping-math"]
 """Nobody reads errno or floating-point traps: without that promise the tracing loop gets no vectors."""
+IS_ABI3 = os.name == "posix"
+"""One build serves every Python: setuptools gives Windows no such name."""
 MORE_FLAGS = "BSLAM_CFLAGS"
 """A variable whose flags come last: -O1 for a build that shall be quick."""
 
@@ -126,13 +129,13 @@ class Extension(setuptools.Extension):
         super().__init__(
             name,
             [os.path.relpath(path, ROOT) for path in files if path.suffix == ".c"],
-            depends=[__file__, *(str(path) for path in [*files, *models])],
+            depends=[__file__, *map(str, [BUILDS_FILE, *files, *models])],
             include_dirs=[str(root)],
             define_macros=list(macros),
             extra_compile_args=[*FLAGS, *flags, *os.environ.get(MORE_FLAGS, "").split()],
             extra_link_args=["-Wl,-s"] if sys.platform == "linux" else [],
             libraries=["m"],
-            py_limited_api=os.name == "posix",
+            py_limited_api=IS_ABI3,
         )
 
 
@@ -236,6 +239,8 @@ class BuildExtensions(build_ext):
     def build_extension(self, extension: Extension) -> None:
         """Unless it is newer than its sources. Raises CompileError with what the compiler said."""
         target = Path(self.get_ext_fullpath(extension.name))
+        for old in target.parent.glob(f"{target.name.split('.')[0]}.cpython-*"):
+            old.unlink()  # of an older bslam, for one Python: import would take it before the .abi3.so
         if not (self.force or newer_group(extension.depends, str(target), "newer")):
             return
         work = Path(self.build_temp, extension.name)
