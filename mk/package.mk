@@ -11,5 +11,6 @@ lock: ## write requirements*.lock.txt: the pins of requirements*.txt with hashes
 	@$(PIP_COMPILE) --output-file requirements-test.lock.txt --constraint requirements.txt requirements-test.txt
 
 package: setup-run ## the wheel and the sdist, in dist
+	@rm -rf build/lib* build/bdist* # else modules that are deleted since would be in the wheel
 	@$(PYTHON) setup.py --quiet sdist --dist-dir dist bdist_wheel --dist-dir dist
 	@ls -l dist

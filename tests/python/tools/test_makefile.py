@@ -36,3 +36,8 @@ def test_firmware_unknown_target_names_the_allowed_ones() -> None:
     result = make("firmware", "TARGET=avr")
     assert result.returncode == 2
     assert "TARGET is avr; allowed: m0plus m33 m4f m4f_whole m55 m7 rv32" in result.stderr
+
+
+def test_package_forgets_what_was_built_before() -> None:
+    *_, forget, build, _ = make("--dry-run", "package").stdout.splitlines()
+    assert forget.startswith("rm -rf build/lib* build/bdist*") and "bdist_wheel" in build
