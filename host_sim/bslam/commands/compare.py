@@ -96,6 +96,10 @@ def compare(
 def _methods(arguments: argparse.Namespace, observation: str) -> list[Method]:
     """Those that come with bslam, all or as --only says, and then the user's. Raises BslamError."""
     shipped = shipped_methods(arguments.map_every)
+    for one in shipped:
+        if one.name in arguments.own:
+            what = "comes with bslam; allowed: --only" if one.is_here else "is not installed; allowed:"
+            raise BslamError(f"--with {one.name}: {what} {one.name if one.is_here else one.install}")
     chosen = _possible(shipped, observation) if arguments.only is None else _named(shipped, arguments.only)
     for text in arguments.own:
         own = own_method(text)

@@ -100,7 +100,9 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _train(arguments: argparse.Namespace) -> int:
     out = arguments.out
-    if out is None or out.suffix != ".json":
+    if out is None:
+        raise BslamError("detect train: --out is missing; allowed: a file to be written, MODEL.json")
+    if out.suffix != ".json":
         raise BslamError(f"--out {out}: allowed: a file to be written, MODEL.json")
     check_name(out.stem)
     wanted = [one for one in (arguments.classes or "").split(",") if one]

@@ -317,7 +317,7 @@ def test_pictures_of_any_shape(trained, tmp_path):
 def test_missing_or_wrong_inputs_are_named(trained, tmp_path, capsys):
     learn = str(trained / "learn")
     for words, said in (
-        (["train", learn], "--out None: allowed: a file to be written, MODEL.json"),
+        (["train", learn], "detect train: --out is missing; allowed: a file to be written, MODEL.json"),
         (
             ["train", learn, "--out", "m.json", "--classes", "tree"],
             "class 'tree' is in no folder; allowed: panel",

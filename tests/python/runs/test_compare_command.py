@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from bslam.cli import main
-from bslam.runs.methods import shipped_methods
+from bslam.runs.methods import Method, shipped_methods
 
 STRANGERS = """
 import os, time
@@ -50,6 +50,14 @@ def scene(made, tmp_path, monkeypatch):
 
 def lines_of(folder):
     return {one["method"]: one for one in json.loads((folder / "compare.json").read_text())["methods"]}
+
+
+def test_with_names_classes_of_ones_own_and_none_that_comes_with_bslam(scene, capsys, monkeypatch):
+    monkeypatch.setattr(Method, "is_here", property(lambda one: one.name != "isam2"))
+    for name, why in (("isam2", "is not installed; allowed: pip install gtsam"), ("map", "comes with bslam")):
+        assert main(["compare", "drive", "--out", "out", "--with", name]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"--with {name}: {why}" in line
 
 
 def test_bad_algorithms_are_named_and_the_others_go_on(scene, capfd):
