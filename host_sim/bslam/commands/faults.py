@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from bslam.commands.arguments import positive_count
 from bslam.errors import BslamError
-from bslam.faults.device import device_faults
+from bslam.faults.device import device_faults, is_clone
 from bslam.faults.drives import drive_faults
 from bslam.faults.images import image_faults
 from bslam.faults.inputs import input_faults
@@ -48,6 +48,9 @@ def execute(arguments: argparse.Namespace) -> int:
     chosen = [one for one in faults if not arguments.only or any(word in one.name for word in arguments.only)]
     if not chosen:
         raise BslamError(f"--only {', '.join(arguments.only)}: no such fault; allowed: {_names(faults)}")
+    if (far := [one for one in chosen if one.takes_clone]) and not is_clone():
+        allowed = "`bslam faults` in a clone of bslam, or --only with others"
+        raise BslamError(f"{_names(far)}: the firmware's sources are not here; allowed: {allowed}")
     results = []
     for fault in tqdm(chosen, unit="fault", disable=None):
         measured = _inject(fault, not arguments.unprotected)

@@ -24,10 +24,13 @@ _SHALLOW = "microbit/shallow.elf"
 """The application with a stack that its call graph exceeds (mk/images.mk)."""
 
 
+def is_clone() -> bool:
+    """The firmware's sources are here, and what makes them."""
+    return (ROOT / "Makefile").is_file()
+
+
 def _built(name: str) -> None:
     """Has make build a file of build/. Raises BslamError with what it said."""
-    if not (ROOT / "Makefile").is_file():
-        raise BslamError("it takes the firmware's sources; allowed: `bslam faults` in a clone of bslam")
     done = subprocess.run(
         ["make", "--silent", f"build/{name}"], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -99,7 +102,7 @@ def device_faults() -> list[Fault]:
     """The rows of the application and its image."""
     number = "the sequence number"
     return [
-        Fault("line: message twice", "applied once", number, partial(_again, 1)),
-        Fault("line: replay", "not applied, state unchanged", number, partial(_again, _REPLAYED)),
-        Fault("stack overflow", "refused before it runs", "the image's call graph", _stack_overflow),
+        Fault("line: message twice", "applied once", number, partial(_again, 1), True),
+        Fault("line: replay", "not applied, state unchanged", number, partial(_again, _REPLAYED), True),
+        Fault("stack overflow", "refused before it runs", "the image's call graph", _stack_overflow, True),
     ]

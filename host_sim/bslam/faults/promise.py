@@ -27,6 +27,7 @@ class Fault:
     promise: str
     protection: str
     inject: Callable[[bool], Measured]
+    takes_clone: bool = False  # what it is injected into is built from the firmware's sources
 
 
 STEP_US = 40_000

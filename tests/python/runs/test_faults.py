@@ -11,6 +11,7 @@ from bslam.cli import main
 from bslam.commands import faults as faults_command
 from bslam.commands.faults import all_faults
 from bslam.errors import BslamError
+from bslam.faults import device
 from bslam.faults.model import FAULT_MODEL, missing_parts
 
 FAULTS = all_faults(1, cut_every=61)
@@ -93,3 +94,12 @@ def test_command_writes_what_it_measured_and_says_how_many(tmp_path, capsys):
 def test_a_fault_that_does_not_exist_is_said(tmp_path, capsys):
     assert main(["faults", "--only", "rain", "--out", str(tmp_path)]) == 2
     assert "rain" in capsys.readouterr().err
+
+
+def test_faults_of_the_firmware_take_a_clone_and_say_so_before_anything_runs(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(device, "ROOT", tmp_path)
+    assert main(["faults", "--only", "line", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    assert "line: message twice, line: replay: the firmware's sources are not here; allowed: " in said.err
+    assert "in a clone of bslam" in said.err and said.out == "" and not (tmp_path / "out").exists()
+    assert main(["faults", "--only", "dt zero", "--out", str(tmp_path / "out")]) == 0
