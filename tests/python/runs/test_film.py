@@ -48,6 +48,16 @@ def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path
         assert counts[1] > 2 * counts[0]
 
 
+def test_film_may_be_webp(short: Path, tmp_path: Path) -> None:
+    short.write_text(short.read_text(encoding="utf-8").replace(f"steps = {STEPS}\n", "steps = 2\n"))
+    words = ["run", str(short), "--pictures", "0", "--out", str(tmp_path / "out")]
+    assert main([*words, "--film", str(tmp_path / "one.webp")]) == 0
+    with Image.open(tmp_path / "one.webp") as film:
+        assert (film.format, film.n_frames, film.info["loop"]) == ("WEBP", 3, 0)
+        film.seek(2)
+        assert shows(film, RESULT_COLOURS["matched"])
+
+
 def test_film_of_another_kind_is_refused_before_anything_runs(
     short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
