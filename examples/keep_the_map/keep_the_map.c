@@ -60,12 +60,20 @@ static bool save(const char *path)
     uint32_t bytes = 0;
     snprintf(beside, sizeof beside, "%s.new", path);
     FILE *file = fopen(beside, "wb");
+    if (file == NULL) {
+        printf("%s: %s\n", beside, strerror(errno));
+        return false;
+    }
     const bslam_map_sink_t sink = {write_file, file};
-    const bool is_written = file != NULL && bslam_save_map(&robot, &sink, &bytes) == BSLAM_OK;
-    const bool is_whole = file != NULL && fclose(file) == 0 && is_written && rename(beside, path) == 0;
-    printf("%s: %s, %d beacons, %u bytes\n", path, is_whole ? "saved" : strerror(errno),
-           (int)bslam_health(&robot).beacons, (unsigned)bytes);
-    return is_whole;
+    const bslam_status_t status = bslam_save_map(&robot, &sink, &bytes);
+    const bool is_closed = fclose(file) == 0;
+    if (status != BSLAM_OK || !is_closed || rename(beside, path) != 0) {
+        printf("%s: not saved: %s\n", path, status != BSLAM_OK ? bslam_status_name(status) : strerror(errno));
+        remove(beside);
+        return false;
+    }
+    printf("%s: saved, %d beacons, %u bytes\n", path, (int)bslam_health(&robot).beacons, (unsigned)bytes);
+    return true;
 }
 
 static bool load(FILE *file, const char *path)
@@ -84,15 +92,21 @@ int main(int argc, char **argv)
 {
     const char *path = argc > 1 ? argv[1] : "room.bslam";
     bslam_settings_t settings;
-    int bad_setting;
+    int bad_setting = -1;
     bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     settings.wheelbase_m = 0.2f;
     settings.recovery = 1;  // to notice that the robot is lost, and to find it again
-    if (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-        printf("setting %s is out of its range\n", bslam_settings_info(bad_setting)->name);
+    const bslam_status_t begun = bslam_init(&robot, &settings, &bad_setting);
+    if (begun != BSLAM_OK) {  // one status names a setting
+        printf("%s %s\n", bslam_status_name(begun),
+               begun == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name : "");
         return 1;
     }
     FILE *file = fopen(path, "rb");
+    if (file == NULL && errno != ENOENT) {  // a map that is there and cannot be read must not be overwritten
+        printf("%s: %s\n", path, strerror(errno));
+        return 1;
+    }
     const bool has_map = file != NULL;
     if (has_map && !load(file, path)) {
         return 1;  // a damaged map is refused as a whole, and the fault says why

@@ -57,8 +57,8 @@ static int64_t board_time_us(void)
     return now_us;
 }
 
-static volatile char
-    received[256];  // the detector's bytes, by the interrupt: none is lost while the filter works
+// The detector's bytes, by the interrupt: none is lost while the filter works.
+static volatile char received[256];
 static volatile uint8_t received_count;
 
 void usart2_interrupt(void)  // in startup.s

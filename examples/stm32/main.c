@@ -5,8 +5,6 @@
 #include "board.h"
 #include "bslam/bslam.h"
 
-#define STEP_US 40000
-
 static bslam_t robot;  // all the memory that the filter has
 static int refused;    // readings and sightings that it did not take: bslam_status_name says why
 
@@ -39,7 +37,8 @@ static void listen_to_detector(void)
 int main(void)
 {
     bslam_settings_t settings;
-    int bad_setting;
+    int bad_setting = -1;
+    char text[80];
     bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     settings.wheelbase_m = 0.2f;  // your robot's measures: docs/TUNING.md says how to find them
     settings.left_radius_m = settings.right_radius_m = 0.033f;
@@ -47,20 +46,21 @@ int main(void)
     settings.counter_bits = 16;
     settings.mount_x_m = 0.05f;  // the camera, ahead of the axle
     board_init();
-    while (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-        board_write(bslam_settings_info(bad_setting)->name);  // is out of its range
+    for (bslam_status_t status; (status = bslam_init(&robot, &settings, &bad_setting)) != BSLAM_OK;) {
+        snprintf(text, sizeof text, "%s %s\n", bslam_status_name(status),  // one status names a setting
+                 status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name : "");
+        board_write(text);
     }
-    for (int64_t step = 1;; step++) {
+    for (int64_t step_us = 40000;; step_us += 40000) {  // 25 times a second
         do {
             listen_to_detector();
-        } while (board_time_us() < step * STEP_US);
+        } while (board_time_us() < step_us);
         const bslam_odometry_reading_t wheels = {.time_us = board_time_us(),
                                                  .source = BSLAM_ODOMETRY_TICKS,
                                                  .left_ticks = left_ticks(),
                                                  .right_ticks = right_ticks()};
         refused += bslam_odometry(&robot, &wheels) != BSLAM_OK;
         const bslam_pose_t pose = bslam_pose(&robot);  // what your robot steers by
-        char text[80];
         snprintf(text, sizeof text, "%d mm, %d mm, %d mrad, %d beacons, %d refused\n", (int)(1e3f * pose.x_m),
                  (int)(1e3f * pose.y_m), (int)(1e3f * pose.theta_rad), (int)bslam_health(&robot).beacons,
                  refused);

@@ -48,8 +48,10 @@ int main(int argc, char **argv)
     settings.association = argc > 1 ? atoi(argv[1]) : BSLAM_ASSOCIATION_POSITION;
     settings.filter = argc > 2 ? atoi(argv[2]) : BSLAM_FILTER_INVARIANT;
     settings.recovery = 1;
-    if (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-        printf("%s\n", bslam_settings_info(bad_setting)->name);
+    const bslam_status_t status = bslam_init(&robot, &settings, &bad_setting);
+    if (status != BSLAM_OK) {
+        printf("%s\n", status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name
+                                                   : bslam_status_name(status));
         return 1;
     }
     double x_m = 0;

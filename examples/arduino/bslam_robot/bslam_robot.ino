@@ -42,15 +42,16 @@ void setup() {
   attachInterrupt(digitalPinToInterrupt(RIGHT_A), right_edge, CHANGE);
 
   bslam_settings_t settings;
-  int bad_setting = 0;
+  int bad_setting = -1;
   bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
   settings.wheelbase_m = WHEELBASE_M;
   settings.left_radius_m = settings.right_radius_m = WHEEL_RADIUS_M;
   settings.ticks_per_revolution = TICKS_PER_REVOLUTION;
   settings.counter_bits = 32;
   settings.mount_x_m = CAMERA_AHEAD_M;
-  while (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-    Serial.println(bslam_settings_info(bad_setting)->name);  // is out of its range
+  for (bslam_status_t status; (status = bslam_init(&robot, &settings, &bad_setting)) != BSLAM_OK;) {
+    Serial.println(bslam_status_name(status));  // one status names a setting
+    Serial.println(status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name : "");
     delay(1000);
   }
 }

@@ -10,7 +10,8 @@
 #include "freertos/task.h"
 
 // Your robot: pins, and measures in app_main (docs/TUNING.md says how to find them).
-enum { LEFT_A = 4, LEFT_B = 5, RIGHT_A = 6, RIGHT_B = 7, DETECTOR_RX = 18, DETECTOR_TX = 17 };
+// These pins are free on ESP32, S2 and S3: no flash, console, USB, or level that is read at the start.
+enum { LEFT_A = 4, LEFT_B = 13, RIGHT_A = 14, RIGHT_B = 18, DETECTOR_RX = 21 };
 enum { STEP_MS = 40, COUNT_LIMIT = 30000, STACK_BYTES = 8192, PRIORITY = 5 };
 
 static bslam_t robot;  // all the memory that the filter has; too large for a task's stack
@@ -46,7 +47,7 @@ static void start_detector(void)
     ESP_ERROR_CHECK(uart_driver_install(UART_NUM_1, 1024, 0, 0, NULL, 0));
     ESP_ERROR_CHECK(uart_param_config(UART_NUM_1, &line));
     ESP_ERROR_CHECK(
-        uart_set_pin(UART_NUM_1, DETECTOR_TX, DETECTOR_RX, UART_PIN_NO_CHANGE, UART_PIN_NO_CHANGE));
+        uart_set_pin(UART_NUM_1, UART_PIN_NO_CHANGE, DETECTOR_RX, UART_PIN_NO_CHANGE, UART_PIN_NO_CHANGE));
 }
 
 /// "AGE_MS TAG BEARING_MRAD RANGE_MM": a tag, left positive. It counts from when the picture was taken.
@@ -61,11 +62,19 @@ static void take_sighting(const char *line)
     refused += !is_whole || bslam_sightings(&robot, time_us, &seen, 1) != BSLAM_OK;
 }
 
-static void listen_to_detector(void)
+/// 0 from then on.
+static TickType_t ticks_until(TickType_t end)
+{
+    const int32_t remaining = (int32_t)(end - xTaskGetTickCount());
+    return remaining > 0 ? (TickType_t)remaining : 0;
+}
+
+/// Waits for bytes, so that a line's age counts from when it has come.
+static void listen_to_detector(TickType_t end)
 {
     static char line[64];
     static size_t length;
-    for (char byte; uart_read_bytes(UART_NUM_1, &byte, 1, 0) == 1;) {
+    for (char byte; uart_read_bytes(UART_NUM_1, &byte, 1, ticks_until(end)) == 1;) {
         if (byte == '\n' || length == sizeof line - 1) {  // what is too long is noise
             line[length] = '\0';
             length = 0;
@@ -80,8 +89,9 @@ static void listen_to_detector(void)
 static void follow(void *unused)
 {
     (void)unused;
-    for (TickType_t woken = xTaskGetTickCount();;) {
-        vTaskDelayUntil(&woken, pdMS_TO_TICKS(STEP_MS));
+    for (TickType_t step = xTaskGetTickCount();;) {
+        step += pdMS_TO_TICKS(STEP_MS);
+        listen_to_detector(step);
         int left_count, right_count;
         ESP_ERROR_CHECK(pcnt_unit_get_count(left, &left_count));
         ESP_ERROR_CHECK(pcnt_unit_get_count(right, &right_count));
@@ -90,7 +100,6 @@ static void follow(void *unused)
                                                  .left_ticks = (uint32_t)left_count,
                                                  .right_ticks = (uint32_t)right_count};
         refused += bslam_odometry(&robot, &wheels) != BSLAM_OK;
-        listen_to_detector();
         const bslam_pose_t pose = bslam_pose(&robot);  // what your robot steers by
         printf("%d mm, %d mm, %d mrad, %d beacons, %d refused\n", (int)(1e3f * pose.x_m),
                (int)(1e3f * pose.y_m), (int)(1e3f * pose.theta_rad), (int)bslam_health(&robot).beacons,
@@ -101,15 +110,17 @@ static void follow(void *unused)
 void app_main(void)
 {
     bslam_settings_t settings;
-    int bad_setting;
+    int bad_setting = -1;
     bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     settings.wheelbase_m = 0.2f;
     settings.left_radius_m = settings.right_radius_m = 0.033f;
     settings.ticks_per_revolution = 1440;
     settings.counter_bits = 32;
     settings.mount_x_m = 0.05f;  // the camera, ahead of the axle
-    if (bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-        printf("setting %s is out of its range\n", bslam_settings_info(bad_setting)->name);
+    const bslam_status_t status = bslam_init(&robot, &settings, &bad_setting);
+    if (status != BSLAM_OK) {  // one status names a setting
+        printf("%s %s\n", bslam_status_name(status),
+               status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name : "");
         return;
     }
     left = start_encoder(LEFT_A, LEFT_B);

@@ -4,13 +4,16 @@ import math
 import re
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from examples.building import EXAMPLES, FIRMWARE, STRICT, STUBS, build_library, drive_end, run
+from examples.building import EXAMPLES, FIRMWARE, ROOT, STRICT, STUBS, build_library, drive_end, run
 
-STM32 = EXAMPLES / "stm32"
+STM32, ESP_IDF = EXAMPLES / "stm32", EXAMPLES / "esp_idf/main"
+SKETCH = EXAMPLES / "arduino/bslam_robot/bslam_robot.ino"
+Build = Callable[..., None]
 DRIVE_S = 42.0  # of stubs/drive.h
 
 
@@ -28,20 +31,49 @@ def check_drive(printed: str, refused: int) -> None:
     assert len(printed.splitlines()) == pytest.approx(25 * DRIVE_S, rel=0.02)
 
 
+def build_stm32(folder: Path, source: Path, library: Path, *flags: str) -> None:
+    """From a copy elsewhere, or it would find its own board.h."""
+    copy = folder / "main.c"
+    copy.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
+    run(
+        *("cc", "-std=gnu11", *STRICT, *flags, f"-I{STUBS / 'stm32'}", f"-I{FIRMWARE}"),
+        *(copy, library, "-lm", "-o", "robot"),
+        folder=folder,
+    )
+
+
+def build_arduino(folder: Path, source: Path, library: Path, *flags: str) -> None:
+    stubs = STUBS / "arduino"
+    run(
+        *("g++", "-std=c++11", *STRICT, "-Wpedantic", f"-I{stubs}", f"-I{FIRMWARE}", "-include", "Arduino.h"),
+        *(*flags, "-x", "c++", source, stubs / "core.cpp", "-x", "none", library, "-lm", "-o", "robot"),
+        folder=folder,
+    )
+
+
+def build_esp_idf(folder: Path, source: Path, library: Path, *flags: str) -> None:
+    stubs = STUBS / "esp_idf"
+    run(
+        *("cc", "-std=gnu11", *STRICT, *flags, f"-I{stubs}", f"-I{FIRMWARE}", source, stubs / "idf.c"),
+        *(library, "-Wl,--wrap=bslam_sightings", "-lm", "-o", "robot"),
+        folder=folder,
+    )
+
+
+def build_desktop(folder: Path, source: Path, library: Path, *flags: str) -> None:
+    run(
+        *("cc", "-std=c11", *STRICT, *flags, f"-I{FIRMWARE}", source, library, "-lm", "-o", "robot"),
+        folder=folder,
+    )
+
+
 def test_stm32_drives(tmp_path: Path) -> None:
     cmake = (STM32 / "CMakeLists.txt").read_text(encoding="utf-8")
     sizes = re.findall(r"BSLAM_[A-Z_]+=\d+", cmake)
     assert len(sizes) == 4
     (tmp_path / "library").mkdir()
     library = build_library(tmp_path / "library", sizes)
-    source = tmp_path / "main.c"  # elsewhere, or it would find its own board.h
-    source.write_text((STM32 / "main.c").read_text(encoding="utf-8"), encoding="utf-8")
-    defines = [f"-D{size}" for size in sizes]
-    run(
-        *("cc", "-std=gnu11", *STRICT, *defines, f"-I{STUBS / 'stm32'}", f"-I{FIRMWARE}"),
-        *(source, library, "-lm", "-o", "robot"),
-        folder=tmp_path,
-    )
+    build_stm32(tmp_path, STM32 / "main.c", library, *(f"-D{size}" for size in sizes))
     check_drive(run("./robot", folder=tmp_path).stdout, refused=2)  # a line cut short, and one that is noise
 
 
@@ -89,25 +121,61 @@ def _last_line_in_qemu(image: Path) -> str:
 
 
 def test_arduino_sketch_drives(tmp_path: Path, library: Path) -> None:
-    sketch = EXAMPLES / "arduino/bslam_robot/bslam_robot.ino"
-    stubs = STUBS / "arduino"
-    run(
-        *("g++", "-std=c++11", *STRICT, "-Wpedantic", f"-I{stubs}", f"-I{FIRMWARE}", "-include", "Arduino.h"),
-        *("-x", "c++", sketch, stubs / "core.cpp", "-x", "none", library, "-lm", "-o", "robot"),
-        folder=tmp_path,
-    )
+    build_arduino(tmp_path, SKETCH, library)
     check_drive(run("./robot", folder=tmp_path).stdout, refused=0)
 
 
 def test_esp_idf_task_drives(tmp_path: Path, library: Path) -> None:
-    stubs = STUBS / "esp_idf"
-    main = EXAMPLES / "esp_idf/main/main.c"
-    run(
-        *("cc", "-std=gnu11", *STRICT, f"-I{stubs}", f"-I{FIRMWARE}", main, stubs / "idf.c", library),
-        *("-lm", "-o", "robot"),
-        folder=tmp_path,
-    )
+    """Its stub looks at the stamp of each picture, too."""
+    build_esp_idf(tmp_path, ESP_IDF / "main.c", library)
     check_drive(run("./robot", folder=tmp_path).stdout, refused=0)
+
+
+# By Espressif's data sheets: pins that are not there, read at the start (strapping), of flash and memory, of the
+# console, of USB.
+TAKEN = {
+    "ESP32": {20, 24, *range(28, 32), *range(34, 40)} | {0, 2, 5, 12, 15} | {*range(6, 12), 16, 17} | {1, 3},
+    "ESP32-S2": {*range(22, 26), 46} | {0, 45} | set(range(26, 33)) | {43, 44} | {19, 20},
+    "ESP32-S3": set(range(22, 26)) | {0, 3, 45, 46} | set(range(26, 38)) | {43, 44} | {19, 20},
+}
+
+
+@pytest.mark.parametrize("chip", TAKEN)
+def test_esp_idf_s_pins_are_free(chip: str) -> None:
+    main = (ESP_IDF / "main.c").read_text(encoding="utf-8")
+    pins = [int(pin) for pin in re.findall(r"(?:_A|_B|_RX) = (\d+)", main)]
+    assert len(pins) == len(set(pins)) == 5
+    assert not TAKEN[chip] & set(pins)
+
+
+BEGINNERS = [
+    (build_stm32, STM32 / "main.c", 2),
+    (build_arduino, SKETCH, 2),
+    (build_esp_idf, ESP_IDF / "main.c", 1),
+    (build_desktop, EXAMPLES / "keep_the_map/keep_the_map.c", 1),
+    (build_desktop, ROOT / "tests/sketches/drive.c", 1),
+]
+"""How it is built, its source, and with which status it ends on this computer if the filter does not begin."""
+
+
+@pytest.mark.parametrize(("build", "source", "status"), BEGINNERS, ids=lambda one: getattr(one, "name", ""))
+def test_what_does_not_begin_says_why(
+    tmp_path: Path, library: Path, build: Build, source: Path, status: int
+) -> None:
+    """Compiled with other sizes than the library; and with a setting outside its range, which has a name."""
+    text = source.read_text(encoding="utf-8").replace(
+        "bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);",
+        "bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS); settings.gate_d2 = -1;",
+    )
+    changed = tmp_path / f"changed{source.suffix}"
+    changed.write_text(text, encoding="utf-8")
+    headers = '-DBSLAM_HEADER="bslam/bslam.h"'
+    build(tmp_path, source, library, "-DBSLAM_BEACONS_MAX=6", headers)
+    said = run("./robot", folder=tmp_path, expect=status).stdout
+    assert set(said.split()) == {"BSLAM_E_SIZE"}  # which names no setting
+    build(tmp_path, changed, library, headers)
+    said = run("./robot", folder=tmp_path, expect=status).stdout
+    assert "gate_d2" in said.split()[:2]
 
 
 IDF = """

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "../drive.h"
+#include "bslam/bslam.h"
 #include "driver/pulse_cnt.h"
 #include "driver/uart.h"
 #include "freertos/task.h"
@@ -15,6 +16,10 @@ struct pcnt_unit_t {
 
 void app_main(void);
 int64_t esp_timer_get_time(void);
+bslam_status_t __wrap_bslam_sightings(bslam_t *robot, int64_t stamp_us, const bslam_sighting_t *seen,
+                                      int count);
+bslam_status_t __real_bslam_sightings(bslam_t *robot, int64_t stamp_us, const bslam_sighting_t *seen,
+                                      int count);
 
 static struct pcnt_unit_t units[2];
 static int unit_count;
@@ -105,9 +110,26 @@ esp_err_t uart_set_pin(uart_port_t port, int tx, int rx, int rts, int cts)
     return port == UART_NUM_1 && tx != rx && rts < 0 && cts < 0 ? ESP_OK : 1;
 }
 
+static void pass_a_millisecond(void)
+{
+    time_us += 1000;
+    if (time_us >= DRIVE_US) {
+        exit(0);
+    }
+    if (time_us % PICTURE_US == 0) {
+        heard_read = 0;
+        heard_length = drive_lines(time_us, heard, sizeof heard);
+    }
+}
+
+/// Waits until there is a byte, or to the end of the last of `wait` ticks.
 int uart_read_bytes(uart_port_t port, void *bytes, uint32_t length, TickType_t wait)
 {
-    if (port != UART_NUM_1 || length != 1 || wait != 0 || heard_read == heard_length) {
+    const TickType_t end = xTaskGetTickCount() + wait;
+    while (heard_read == heard_length && xTaskGetTickCount() < end) {
+        pass_a_millisecond();
+    }
+    if (port != UART_NUM_1 || length != 1 || heard_read == heard_length) {
         return 0;
     }
     memcpy(bytes, &heard[heard_read++], 1);
@@ -124,19 +146,15 @@ TickType_t xTaskGetTickCount(void)
     return (TickType_t)(time_us / 10000);
 }
 
-void vTaskDelayUntil(TickType_t *woken, TickType_t ticks)
+/// The linker has the example call this one: stamps must be the pictures' to the millisecond.
+bslam_status_t __wrap_bslam_sightings(bslam_t *robot, int64_t stamp_us, const bslam_sighting_t *seen,
+                                      int count)
 {
-    *woken += ticks;
-    while (time_us < (int64_t)*woken * 10000) {
-        time_us += 1000;
-        if (time_us % PICTURE_US == 0) {
-            heard_read = 0;
-            heard_length = drive_lines(time_us, heard, sizeof heard);
-        }
+    if ((stamp_us + AGE_US) % PICTURE_US > 1000) {
+        printf("a picture's stamp is late by %d us\n", (int)((stamp_us + AGE_US) % PICTURE_US));
+        exit(3);
     }
-    if (time_us >= DRIVE_US) {
-        exit(0);
-    }
+    return __real_bslam_sightings(robot, stamp_us, seen, count);
 }
 
 BaseType_t xTaskCreate(TaskFunction_t task, const char *name, uint32_t stack_bytes, void *argument,

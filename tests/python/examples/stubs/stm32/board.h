@@ -48,5 +48,9 @@ static inline int64_t board_time_us(void)
 
 static inline void board_write(const char *text)
 {
+    static int lines;
+    if (++lines > 2000) {  // more than in the drive: it does not begin
+        exit(2);
+    }
     fputs(text, stdout);
 }

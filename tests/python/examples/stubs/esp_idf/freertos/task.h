@@ -2,6 +2,5 @@ typedef void (*TaskFunction_t)(void *);
 typedef void *TaskHandle_t;
 
 TickType_t xTaskGetTickCount(void);
-void vTaskDelayUntil(TickType_t *woken, TickType_t ticks);
 BaseType_t xTaskCreate(TaskFunction_t task, const char *name, uint32_t stack_bytes, void *argument,
                        UBaseType_t priority, TaskHandle_t *created);
