@@ -45,12 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     faults = all_faults(arguments.seeds)
-    chosen = [one for one in faults if not arguments.only or any(word in one.name for word in arguments.only)]
-    if not chosen:
-        raise BslamError(f"--only {', '.join(arguments.only)}: no such fault; allowed: {_names(faults)}")
-    if (far := [one for one in chosen if one.takes_clone]) and not is_clone():
-        allowed = "`bslam faults` in a clone of bslam, or --only with others"
-        raise BslamError(f"{_names(far)}: the firmware's sources are not here; allowed: {allowed}")
+    chosen = _chosen(faults, arguments.only)
     results = []
     for fault in tqdm(chosen, unit="fault", disable=None):
         measured = _inject(fault, not arguments.unprotected)
@@ -81,6 +76,17 @@ def execute(arguments: argparse.Namespace) -> int:
     )
     print(f"{kept} of {promised} as promised")
     return 0 if kept == promised else 1
+
+
+def _chosen(faults: list[Fault], only: list[str] | None) -> list[Fault]:
+    """Those that are asked for. Raises BslamError if there are none, or one that cannot be injected here."""
+    chosen = [one for one in faults if only is None or any(word in one.name for word in only)]
+    if only is not None and not chosen:
+        raise BslamError(f"--only {', '.join(only)}: no such fault; allowed: {_names(faults)}")
+    if (far := [one for one in chosen if one.takes_clone]) and not is_clone():
+        allowed = "`bslam faults` in a clone of bslam, or --only with others"
+        raise BslamError(f"{_names(far)}: the firmware's sources are not here; allowed: {allowed}")
+    return chosen
 
 
 def _inject(fault: Fault, protected: bool) -> Measured:
