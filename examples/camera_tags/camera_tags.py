@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import csv
 import math
+import statistics
 import sys
 import tomllib
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam import Slam
+from bslam import CoreError, Slam
 
 CORNER_SD_PX = 0.5  # how far off the detector's corners are: let it look at a tag while nothing moves
 RANGE_SCALE_SD = 0.015  # and by what part a tag's distances err alike: its corners come out a little inside
@@ -44,8 +46,7 @@ class Camera:
     wheelbase_m: float
 
 
-@dataclass(frozen=True)
-class Seen:
+class Seen(NamedTuple):
     """A tag in a picture: number, direction (left positive) and distance in the plane, with their noise."""
 
     label: int
@@ -60,9 +61,10 @@ class TagDetector:
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera
-        self._matrix = np.array(
+        matrix = np.array(
             [[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]], np.float64
         )
+        self._lens = matrix, np.array(camera.distortion)
         half_m = camera.tag_m / 2  # x right, y up on the tag; from the upper left corner clockwise
         self._corners_m = half_m * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]], np.float64)
         parameters = cv2.aruco.DetectorParameters()
@@ -78,13 +80,8 @@ class TagDetector:
 
     def _seen(self, label: int, corners_px: NDArray[Any]) -> Seen:
         """From the tag's place alone, x right, z ahead. Its orientation is left out: it has two solutions."""
-        _, _, place = cv2.solvePnP(
-            self._corners_m,
-            corners_px.astype(np.float64),
-            self._matrix,
-            np.array(self._camera.distortion),
-            flags=cv2.SOLVEPNP_IPPE_SQUARE,
-        )
+        flags = cv2.SOLVEPNP_IPPE_SQUARE
+        _, _, place = cv2.solvePnP(self._corners_m, corners_px.astype(float), *self._lens, flags=flags)
         x_m, _, z_m = place.ravel().tolist()
         range_m = math.hypot(x_m, z_m)
         bearing_sd_rad = CORNER_SD_PX / self._camera.fx_px
@@ -102,15 +99,18 @@ def read_grey(path: Path) -> Picture:
 
 def feed(slam: Slam, time_us: int, seen: list[Seen]) -> None:
     """What one picture shows; none is news, too."""
+    labels, bearings, ranges, bearing_sds, range_sds = np.reshape(seen, (-1, len(Seen._fields))).T.tolist()
     slam.sightings(
-        time_us,
-        [one.bearing_rad for one in seen],
-        [one.range_m for one in seen],
-        [one.label for one in seen],
-        [True] * len(seen),
-        [one.bearing_sd_rad for one in seen],
-        [one.range_sd_m for one in seen],
+        time_us, bearings, ranges, list(map(int, labels)), [True] * len(seen), bearing_sds, range_sds
     )
+
+
+def start_clock(slam: Slam, first_picture_us: int, rows_us: list[int]) -> None:
+    """By an empty frame: the first row's travel began at a picture before it, else one usual step before."""
+    step_us = round(statistics.median([later - earlier for earlier, later in pairwise(rows_us)] or [40_000]))
+    start_us = first_picture_us if first_picture_us < rows_us[0] else rows_us[0] - step_us
+    if start_us >= 0:  # else there is no such time, and the first row starts the clock
+        slam.sightings(start_us, [], [], [], [])
 
 
 def map_drive(drive: Path) -> Slam:
@@ -121,22 +121,26 @@ def map_drive(drive: Path) -> Slam:
     slam = Slam({name: getattr(camera, name) for name in names} | {"range_scale_sd": RANGE_SCALE_SD})
     pictures = sorted((int(path.stem), path) for path in (drive / "pictures").glob("*.png"))
     if not pictures:
-        raise SystemExit(
-            f"{drive}/pictures: no picture there; allowed: TIME_US.png, times as in odometry.csv"
-        )
-    slam.sightings(pictures[0][0], [], [], [], [])  # an empty frame starts the clock
+        raise SystemExit(f"{drive}/pictures: no picture there; allowed: TIME_US.png on odometry.csv's clock")
     with (drive / "odometry.csv").open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            time_us = int(row["time_us"])
-            slam.odometry("wheels", time_us, float(row["left_m"]), float(row["right_m"]))
-            while pictures and pictures[0][0] <= time_us:  # a picture after the reading that covers it
-                taken_us, path = pictures.pop(0)
-                feed(slam, taken_us, detector.find(read_grey(path)))
+        rows = list(csv.DictReader(file))
+    if not rows:
+        raise SystemExit(f"{drive}/odometry.csv: no row; allowed: time_us,left_m,right_m")
+    start_clock(slam, pictures[0][0], [int(row["time_us"]) for row in rows])
+    for row in rows:
+        time_us = int(row["time_us"])
+        slam.odometry("wheels", time_us, float(row["left_m"]), float(row["right_m"]))
+        while pictures and pictures[0][0] <= time_us:  # a picture after the reading that covers it
+            taken_us, path = pictures.pop(0)
+            feed(slam, taken_us, detector.find(read_grey(path)))
     return slam
 
 
 if __name__ == "__main__":
-    slam = map_drive(Path(sys.argv[1]))
+    try:
+        slam = map_drive(Path(sys.argv[1]))
+    except CoreError as error:
+        sys.exit(f"camera_tags: {error}")
     print("robot: x {:.3f} m, y {:.3f} m, heading {:.3f} rad".format(*slam.pose()))
     for beacon in slam.beacons():
         sd_m = math.sqrt(max(beacon.covariance[0][0], beacon.covariance[1][1]))

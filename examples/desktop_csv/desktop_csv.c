@@ -3,7 +3,7 @@
 //     desktop_csv FOLDER [SETTING=VALUE ...] > path.tum
 //
 // The path goes to standard output, a row for each of odometry's: time_s x y 0 0 0 qz qw, the TUM format. The
-// map goes to standard error.
+// map goes to standard error. Exit status 1: the filter refused something, 2: it could not begin.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,125 +15,128 @@ static bslam_t robot;
 static int refused;  // rows and frames that the filter did not take
 
 /// A table of numbers, read row by row.
-typedef struct table {
+static struct table {
     char path[512], header[512], row[512];
+    int64_t time_us;  // of the row; INT64_MAX behind the last one
     FILE *file;
-} table_t;
+} odometry, sightings;
 
-static void stop(const char *where, const char *what, const char *why)
+static void require(bool is_fine, const char *where, const char *what, const char *why)
 {
-    fprintf(stderr, "desktop_csv: %s: %s: %s\n", where, what, why);
-    exit(2);
-}
-
-static bool read_row(table_t *table)
-{
-    return fgets(table->row, sizeof table->row, table->file) != NULL;
-}
-
-static void open_table(table_t *table, const char *folder, const char *name)
-{
-    snprintf(table->path, sizeof table->path, "%s/%s", folder, name);
-    table->file = fopen(table->path, "r");
-    if (table->file == NULL || !read_row(table)) {
-        stop(table->path, "its header", "cannot be read");
+    if (!is_fine) {
+        fprintf(stderr, "desktop_csv: %s: %s: %s\n", where, what, why);
+        exit(2);
     }
-    strcpy(table->header, table->row);
+}
+
+/// What stands under a title, up to a comma or the line's end; NULL: there is no such title, or no field.
+static const char *field_of(const char *titles, const char *row, const char *title)
+{
+    if (strcspn(titles, ",\r\n") == strlen(title) && strncmp(titles, title, strlen(title)) == 0) {
+        return row;
+    }
+    const char *more = strchr(titles, ','), *rest = strchr(row, ',');
+    return more == NULL || rest == NULL ? NULL : field_of(more + 1, rest + 1, title);
 }
 
 /// A number of the row; `otherwise` where there is no such column, or nothing in it.
-static double value(table_t *table, const char *name, double otherwise)
+static double value(const struct table *table, const char *title, double otherwise)
 {
-    const size_t length = strlen(name);
-    char *title = table->header, *field = table->row, *end;
-    for (; strncmp(title, name, length) != 0 || strchr(",\r\n", title[length]) == NULL; title++, field++) {
-        title = strchr(title, ',');
-        field = strchr(field, ',');
-        if (title == NULL || field == NULL) {
-            return otherwise;
-        }
-    }
-    const double number = strtod(field, &end);
-    if (strchr(",\r\n", *end) == NULL) {
-        stop(table->path, name, table->row);  // which has no number there
-    }
+    const char *field = field_of(table->header, table->row, title);
+    char *end = NULL;
+    const double number = field == NULL ? otherwise : strtod(field, &end);
+    require(end == NULL || strchr(",\r\n", *end) != NULL, table->path, title, table->row);  // no number there
     return end == field ? otherwise : number;
+}
+
+static void read_row(struct table *table)
+{
+    const bool is_row = fgets(table->row, sizeof table->row, table->file) != NULL;
+    table->time_us = is_row ? (int64_t)value(table, "time_us", -1) : INT64_MAX;
+}
+
+/// With columns as in "allowed: time_us,left_m" and no others.
+static void open_table(struct table *table, const char *folder, const char *name, const char *columns)
+{
+    snprintf(table->path, sizeof table->path, "%s/%s", folder, name);
+    table->file = fopen(table->path, "r");
+    require(table->file != NULL && fgets(table->header, sizeof table->header, table->file) != NULL,
+            table->path, "its header", "cannot be read");
+    strcpy(table->row, table->header);
+    for (char *title = strtok(table->row, ",\r\n"); title != NULL; title = strtok(NULL, ",\r\n")) {
+        require(field_of(strchr(columns, ' ') + 1, columns, title) != NULL, table->path, title, columns);
+    }
+    read_row(table);
 }
 
 static void set(bslam_settings_t *settings, const char *word)
 {
-    char name[64];
+    char name[64] = "", more;
     float number;
-    for (int id = 0; sscanf(word, "%63[^=]=%f", name, &number) == 2 && bslam_settings_info(id) != NULL;
-         id++) {
-        if (strcmp(bslam_settings_info(id)->name, name) == 0 &&
-            bslam_settings_set(settings, id, number) == BSLAM_OK) {
-            return;
-        }
+    int id;
+    const bool is_whole = sscanf(word, "%63[^=]=%f%c", name, &number, &more) == 2;
+    for (id = 0; bslam_settings_info(id) != NULL && strcmp(bslam_settings_info(id)->name, name) != 0; id++) {
     }
-    stop("setting", word, "allowed: NAME=VALUE, names and ranges as in docs/TUNING.md");
+    require(is_whole && bslam_settings_set(settings, id, number) == BSLAM_OK, "setting", word,
+            "allowed: NAME=VALUE, names and ranges as in docs/TUNING.md");
 }
 
-/// Rows of one stamp are one frame. Returns whether there is another row.
-static bool take_frame(table_t *table)
+/// Up to a moment. Rows of one stamp are one frame.
+static void take_frames(struct table *table, int64_t last_us)
 {
     bslam_sighting_t seen[BSLAM_SIGHTINGS_MAX];
-    const double time_us = value(table, "time_us", -1);
-    int count = 0;
-    bool is_more = true;
-    for (; is_more && count < BSLAM_SIGHTINGS_MAX && value(table, "time_us", -1) == time_us; count++) {
-        seen[count] = (bslam_sighting_t){
-            .bearing_rad = (float)value(table, "bearing_rad", NAN),
-            .range_m = (float)value(table, "range_m", NAN),
-            .has_range = !isnan(value(table, "range_m", NAN)),
-            .bearing_sd_rad = (float)value(table, "bearing_sd_rad", 0),
-            .range_sd_m = (float)value(table, "range_sd_m", 0),
-            .label = (int32_t)value(table, "beacon_id", BSLAM_LABEL_NONE),
-            .beacon_class = value(table, "mappable", 1) == 0 ? BSLAM_CLASS_NOT_MAPPABLE : BSLAM_CLASS_NONE};
-        is_more = read_row(table);
+    while (table->time_us <= last_us) {
+        const int64_t time_us = table->time_us;
+        int count = 0;
+        for (; table->time_us == time_us && count < BSLAM_SIGHTINGS_MAX; count++) {
+            seen[count] = (bslam_sighting_t){
+                .bearing_rad = (float)value(table, "bearing_rad", NAN),
+                .range_m = (float)value(table, "range_m", NAN),
+                .has_range = !isnan(value(table, "range_m", NAN)),
+                .bearing_sd_rad = (float)value(table, "bearing_sd_rad", 0),
+                .range_sd_m = (float)value(table, "range_sd_m", 0),
+                .label = (int32_t)value(table, "beacon_id", BSLAM_LABEL_NONE),
+                .beacon_class = value(table, "mappable", 1) ? BSLAM_CLASS_NONE : BSLAM_CLASS_NOT_MAPPABLE};
+            read_row(table);
+        }
+        refused += bslam_sightings(&robot, time_us, seen, count) != BSLAM_OK;
     }
-    refused += bslam_sightings(&robot, (int64_t)time_us, seen, count) != BSLAM_OK;
-    return is_more;
 }
 
 int main(int argc, char **argv)
 {
-    static table_t odometry, sightings;
     bslam_settings_t settings;
     bslam_beacon_view_t beacon;
-    int bad_setting;
     bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     for (int i = 2; i < argc; i++) {
         set(&settings, argv[i]);
     }
-    if (argc < 2 || bslam_init(&robot, &settings, &bad_setting) != BSLAM_OK) {
-        stop("arguments", "allowed", "FOLDER [SETTING=VALUE ...], settings that go together");
-    }
-    open_table(&odometry, argv[1], "odometry.csv");
-    open_table(&sightings, argv[1], "sightings.csv");
-    bool is_more = read_row(&sightings);
-    for (bool is_first = strstr(odometry.header, "left_m") != NULL; read_row(&odometry); is_first = false) {
+    require(argc >= 2, "arguments", "allowed", "FOLDER [SETTING=VALUE ...]");
+    const bslam_status_t status = bslam_init(&robot, &settings, &(int){-1});
+    require(status == BSLAM_OK, "settings", bslam_status_name(status), "as docs/C-API.md explains");
+    open_table(&odometry, argv[1], "odometry.csv", "allowed: time_us,left_m,right_m,left_ticks,right_ticks");
+    open_table(&sightings, argv[1], "sightings.csv",
+               "allowed: time_us,beacon_id,bearing_rad,range_m,bearing_sd_rad,range_sd_m,mappable");
+    // Frames before the first travel start the clock; each other goes in after the reading that covers it.
+    take_frames(&sightings, strstr(odometry.header, "left_m") != NULL ? odometry.time_us - 1 : INT64_MIN);
+    for (; odometry.time_us < INT64_MAX; read_row(&odometry)) {
         const bslam_odometry_reading_t reading = {
-            .time_us = (int64_t)value(&odometry, "time_us", -1),
+            .time_us = odometry.time_us,
             .source = strstr(odometry.header, "left_ticks") ? BSLAM_ODOMETRY_TICKS : BSLAM_ODOMETRY_WHEELS,
             .left_ticks = (uint32_t)(int64_t)value(&odometry, "left_ticks", 0),
             .right_ticks = (uint32_t)(int64_t)value(&odometry, "right_ticks", 0),
             .left_m = (float)value(&odometry, "left_m", NAN),
             .right_m = (float)value(&odometry, "right_m", NAN)};
-        // A frame goes in after the reading that covers it; one before the first travel starts the clock.
-        while (is_first && is_more && value(&sightings, "time_us", -1) < (double)reading.time_us) {
-            is_more = take_frame(&sightings);
-        }
         refused += bslam_odometry(&robot, &reading) != BSLAM_OK;
-        while (is_more && value(&sightings, "time_us", -1) <= (double)reading.time_us) {
-            is_more = take_frame(&sightings);
-        }
+        take_frames(&sightings, reading.time_us);
         const bslam_pose_t pose = bslam_pose(&robot);
         printf("%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", 1e-6 * (double)reading.time_us, pose.x_m, pose.y_m,
                sin(0.5 * pose.theta_rad), cos(0.5 * pose.theta_rad));
     }
+    take_frames(&sightings, INT64_MAX - 1);  // those behind the last row
     for (int i = 0; bslam_beacon(&robot, i, &beacon) == BSLAM_OK; i++) {
         fprintf(stderr, "beacon %d: x %.9g m, y %.9g m\n", (int)beacon.label, beacon.x_m, beacon.y_m);
     }
     fprintf(stderr, "%d rows and frames refused\n", refused);
+    return refused > 0 ? 1 : 0;
 }

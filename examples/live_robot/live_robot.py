@@ -12,6 +12,7 @@ from __future__ import annotations
 import queue
 import sys
 import threading
+import time
 from dataclasses import dataclass
 from typing import TextIO
 
@@ -34,9 +35,9 @@ BEACONS = 6  # the robot's image must have room for them: BSLAM_BEACONS_MAX
 
 @dataclass(frozen=True)
 class Seen:
-    """A tag, so long ago."""
+    """A tag, and when its picture was taken, on this computer's clock."""
 
-    age_us: int
+    taken_s: float
     label: int
     bearing_rad: float
     range_m: float
@@ -44,8 +45,9 @@ class Seen:
 
 def read_line(line: str) -> Seen:
     """Raises ValueError for what is no such line."""
+    now_s = time.monotonic()
     age_ms, label, bearing_mrad, range_mm = map(int, line.split())
-    return Seen(1000 * age_ms, label, 1e-3 * bearing_mrad, 1e-3 * range_mm)
+    return Seen(now_s - 1e-3 * age_ms, label, 1e-3 * bearing_mrad, 1e-3 * range_mm)
 
 
 def listen(detector: TextIO) -> queue.SimpleQueue[Seen | None]:
@@ -66,23 +68,22 @@ def listen(detector: TextIO) -> queue.SimpleQueue[Seen | None]:
 
 def follow(robot: RemoteSlam, told: queue.SimpleQueue[Seen | None]) -> None:
     """Until the detector ends."""
-    now_us: int | None = None  # the robot's clock, as of its last report
+    ahead_s: float | None = None  # this computer's clock, ahead of the robot's by its last report
     while True:
         for one in robot.reports(0.1):
-            now_us = one.time_us
+            ahead_s = time.monotonic() - 1e-6 * one.time_us
             x_m, y_m, heading_rad = one.report.step.pose
-            print(f"{now_us} {x_m:.3f} {y_m:.3f} {heading_rad:.3f}", flush=True)
+            print(f"{one.time_us} {x_m:.3f} {y_m:.3f} {heading_rad:.3f}", flush=True)
         while not told.empty():
             seen = told.get()
             if seen is None:
                 return
-            if now_us is None:
+            if ahead_s is None:
                 print(f"tag {seen.label} before the robot said what time it is: left out", file=sys.stderr)
                 continue
+            taken_us = round(1e6 * (seen.taken_s - ahead_s))
             try:
-                robot.sightings(
-                    now_us - seen.age_us, [seen.bearing_rad], [seen.range_m], [seen.label], [True]
-                )
+                robot.sightings(taken_us, [seen.bearing_rad], [seen.range_m], [seen.label], [True])
             except CoreError as refusal:  # too old, impossible: the robot is then as it was
                 print(refusal, file=sys.stderr)
 

@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -13,7 +14,7 @@ from bslam.cli import main
 from bslam.log import Log, Odometry, first_steps
 from bslam.world.simulate import load_scenario, simulate
 from examples import tag_room
-from examples.building import EXAMPLES, build_as_its_readme_says, run
+from examples.building import EXAMPLES, FIRMWARE, STRICT, build_as_its_readme_says, run
 
 # ---- desktop_csv -------------------------------------------------------------------------------------------
 
@@ -55,7 +56,7 @@ def test_desktop_csv_gives_what_replay_gives(
     out = tmp_path / "out"
     replayed = ["replay", "csv", str(tmp_path / "drive"), "--out", str(out), "--pictures", "0"]
     assert main([*replayed, "--association", "known", *words]) == 0
-    done = run(desktop_csv, "drive", *settings, folder=tmp_path)
+    done = run(desktop_csv, "drive", *settings, folder=tmp_path, expect=1 if refuses else 0)
     path = (out / "drive.estimate.tum").read_text().splitlines()
     assert done.stdout.splitlines() == path[-len(done.stdout.splitlines()) :]
     assert len(done.stdout.splitlines()) == 400
@@ -72,15 +73,24 @@ def test_desktop_csv_gives_what_replay_gives(
         (["nowhere"], "nowhere/odometry.csv: its header: cannot be read"),
         (["drive", "wheelbase=0.3"], "setting: wheelbase=0.3: allowed: NAME=VALUE"),
         (["drive", "wheelbase_m=-1"], "setting: wheelbase_m=-1: allowed: NAME=VALUE"),
+        (["drive", "wheelbase_m=0.3abc"], "setting: wheelbase_m=0.3abc: allowed: NAME=VALUE"),
         (["bad"], "bad/odometry.csv: left_m: 40000,1 cm,0.1"),
+        (["gyro"], "gyro/odometry.csv: gyro_radps: allowed: time_us,left_m,right_m,left_ticks,right_ticks"),
+        (["left"], "left/odometry.csv: left: allowed: time_us,left_m"),
     ],
 )
 def test_desktop_csv_says_in_a_line_what_is_bad(
     tmp_path: Path, desktop_csv: Path, words: list[str], says: str
 ) -> None:
-    for folder, travel in (("drive", "0.1"), ("bad", "1 cm")):
+    drives = {
+        "drive": "left_m,right_m\n40000,0.1,0.1",
+        "bad": "left_m,right_m\n40000,1 cm,0.1",
+        "gyro": "left_m,right_m,gyro_radps\n40000,0.1,0.1,0",
+        "left": "left,right\n40000,0.1,0.1",
+    }
+    for folder, rows in drives.items():
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "odometry.csv").write_text(f"time_us,left_m,right_m\n40000,{travel},0.1\n")
+        (tmp_path / folder / "odometry.csv").write_text(f"time_us,{rows}\n")
         (tmp_path / folder / "sightings.csv").write_text("time_us,beacon_id,bearing_rad\n0,1,0.1\n")
     done = run(desktop_csv, *words, folder=tmp_path, expect=2)
     assert done.stderr.startswith(f"desktop_csv: {says}")
@@ -130,7 +140,35 @@ def test_keep_the_map_refuses_a_damaged_map_and_leaves_it(tmp_path: Path, keep_t
     assert said == "room.bslam: BSLAM_E_MAP, bslam_map_fault_t 6, 0 beacons\n"  # BSLAM_MAP_BAD_CRC
     assert path.read_bytes() == damaged
     said = run(keep_the_map, "nowhere/room.bslam", folder=tmp_path, expect=1).stdout
-    assert "nowhere/room.bslam: No such file or directory" in said
+    assert "nowhere/room.bslam.new: No such file or directory" in said
+
+
+def test_keep_the_map_leaves_a_map_that_it_cannot_open(tmp_path: Path, keep_the_map: Path) -> None:
+    path = tmp_path / "room.bslam"
+    path.symlink_to(path)  # to itself
+    said = run(keep_the_map, folder=tmp_path, expect=1).stdout
+    assert said == "room.bslam: Too many levels of symbolic links\n"
+    assert path.is_symlink()
+
+
+FAILS = """#include "bslam/bslam.h"
+bslam_status_t __wrap_bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
+bslam_status_t __wrap_bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes)
+{
+    (void)robot, (void)bytes;
+    return sink->write(sink->context, "half", 4) ? BSLAM_E_STATE : BSLAM_E_MAP;
+}
+"""
+
+
+def test_keep_the_map_names_the_status_of_a_map_that_is_not_saved(tmp_path: Path, library: Path) -> None:
+    (tmp_path / "fails.c").write_text(FAILS, encoding="utf-8")
+    source = EXAMPLES / "keep_the_map/keep_the_map.c"
+    words = ("-Wl,--wrap=bslam_save_map", library, "-lm", "-o", "keep_the_map")
+    run("cc", "-std=c11", *STRICT, f"-I{FIRMWARE}", source, "fails.c", *words, folder=tmp_path)
+    said = run("./keep_the_map", folder=tmp_path, expect=1).stdout
+    assert said.splitlines()[-1] == "room.bslam: not saved: BSLAM_E_STATE"
+    assert not list(tmp_path.glob("room.bslam*"))
 
 
 # ---- camera_tags -------------------------------------------------------------------------------------------
@@ -165,6 +203,36 @@ def test_two_orientations_of_a_tag_share_its_place() -> None:
         at_m = corners_m @ turn.T + place_m
         seen_px.append(tag_room.FOCAL_PX * at_m[:, :2] / at_m[:, 2:])
     assert np.abs(seen_px[0] - seen_px[1]).max() < 0.5  # as far as a detector's corners are off
+
+
+def write_straight(folder: Path, first_row_us: int, picture_us: int) -> None:
+    """20 rows of 1 cm, and one picture of nothing."""
+    (folder / "pictures").mkdir(parents=True)
+    tag_room.write_camera(folder)
+    grey = np.full((tag_room.HEIGHT_PX, tag_room.WIDTH_PX), 150, np.uint8)
+    cv2.imwrite(str(folder / "pictures" / f"{picture_us}.png"), grey)
+    rows = [f"{first_row_us + 40_000 * row},0.01,0.01" for row in range(20)]
+    (folder / "odometry.csv").write_text(
+        "\n".join(["time_us,left_m,right_m", *rows]) + "\n", encoding="utf-8"
+    )
+
+
+@pytest.mark.parametrize(
+    ("first_row_us", "picture_us"), [(90_000, 80_000), (90_000, 90_000), (90_000, 400_000)]
+)
+def test_camera_tags_takes_pictures_that_begin_before_or_after_the_wheels(
+    tmp_path: Path, first_row_us: int, picture_us: int
+) -> None:
+    write_straight(tmp_path, first_row_us, picture_us)
+    printed = run(sys.executable, CAMERA_TAGS, tmp_path, folder=tmp_path).stdout
+    assert printed.startswith("robot: x 0.200 m, y 0.000 m")  # the first row's travel is in it
+
+
+def test_camera_tags_says_in_a_line_what_the_filter_refuses(tmp_path: Path) -> None:
+    write_straight(tmp_path, 10_000_000, 0)
+    done = run(sys.executable, CAMERA_TAGS, tmp_path, folder=tmp_path, expect=1)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("camera_tags: odometry at 10000000 us") and "BSLAM_E_TIME" in line
 
 
 def test_camera_tags_says_that_there_is_no_picture(tmp_path: Path) -> None:

@@ -131,8 +131,8 @@ def test_esp_idf_task_drives(tmp_path: Path, library: Path) -> None:
     check_drive(run("./robot", folder=tmp_path).stdout, refused=0)
 
 
-# By Espressif's data sheets: pins that are not there, read at the start (strapping), of flash and memory, of the
-# console, of USB.
+# By Espressif's data sheets: pins that are not there, read at the start (strapping), of flash and memory,
+# of the console, of USB.
 TAKEN = {
     "ESP32": {20, 24, *range(28, 32), *range(34, 40)} | {0, 2, 5, 12, 15} | {*range(6, 12), 16, 17} | {1, 3},
     "ESP32-S2": {*range(22, 26), 46} | {0, 45} | set(range(26, 33)) | {43, 44} | {19, 20},
@@ -155,7 +155,7 @@ BEGINNERS = [
     (build_desktop, EXAMPLES / "keep_the_map/keep_the_map.c", 1),
     (build_desktop, ROOT / "tests/sketches/drive.c", 1),
 ]
-"""How it is built, its source, and with which status it ends on this computer if the filter does not begin."""
+"""How it is built, its source, its exit status on this computer if the filter does not begin."""
 
 
 @pytest.mark.parametrize(("build", "source", "status"), BEGINNERS, ids=lambda one: getattr(one, "name", ""))
