@@ -11,7 +11,7 @@ from examples.building import EXAMPLES
 
 
 class Robot:
-    """It reports once. A line comes 30 ms later, 10 ms after its picture, and is looked at after 5 ms more."""
+    """Reports once. A line comes 30 ms later, 10 ms after its picture, and is looked at after 5 ms more."""
 
     def __init__(self, live_robot: Any, clock: SimpleNamespace) -> None:
         self._example, self._clock, self._calls = live_robot, clock, 0
