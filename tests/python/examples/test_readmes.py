@@ -68,7 +68,7 @@ def test_what_a_step_takes_without_a_floating_point_unit_is_as_sizes_has_it() ->
     rows = re.findall(r"^\| `step` \| (6|20) \| (\d+) \| (\d+) \|", sizes, re.MULTILINE)
     without = {beacons: f"{int(m0) / 1e6:.1f}" for beacons, m0, _ in rows}
     with_one = {beacons: f"{round(int(m4f), -3):,}" for beacons, _, m4f in rows}
-    text = (EXAMPLES / "arduino/README.md").read_text(encoding="utf-8").replace("\n", " ").replace("  ", " ")
+    text = " ".join((EXAMPLES / "arduino/README.md").read_text(encoding="utf-8").split())
     assert f"with 20 beacons takes {without['20']} million instructions" in text
     assert f"with 6 beacons {without['6']} million" in text and "-DBSLAM_BEACONS_MAX=6" in text
     assert f"An M4F needs {with_one['20']} for 20 beacons" in text
