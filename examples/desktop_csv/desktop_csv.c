@@ -119,7 +119,7 @@ int main(int argc, char **argv)
                "allowed: time_us,beacon_id,bearing_rad,range_m,bearing_sd_rad,range_sd_m,mappable");
     // Frames before the first travel start the clock; each other goes in after the reading that covers it.
     take_frames(&sightings, strstr(odometry.header, "left_m") != NULL ? odometry.time_us - 1 : INT64_MIN);
-    for (; odometry.time_us < INT64_MAX; read_row(&odometry)) {
+    while (odometry.time_us < INT64_MAX) {
         const bslam_odometry_reading_t reading = {
             .time_us = odometry.time_us,
             .source = strstr(odometry.header, "left_ticks") ? BSLAM_ODOMETRY_TICKS : BSLAM_ODOMETRY_WHEELS,
@@ -128,12 +128,12 @@ int main(int argc, char **argv)
             .left_m = (float)value(&odometry, "left_m", NAN),
             .right_m = (float)value(&odometry, "right_m", NAN)};
         refused += bslam_odometry(&robot, &reading) != BSLAM_OK;
-        take_frames(&sightings, reading.time_us);
+        read_row(&odometry);  // behind the last one come all frames that are left
+        take_frames(&sightings, odometry.time_us < INT64_MAX ? reading.time_us : INT64_MAX - 1);
         const bslam_pose_t pose = bslam_pose(&robot);
         printf("%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", 1e-6 * (double)reading.time_us, pose.x_m, pose.y_m,
                sin(0.5 * pose.theta_rad), cos(0.5 * pose.theta_rad));
     }
-    take_frames(&sightings, INT64_MAX - 1);  // those behind the last row
     for (int i = 0; bslam_beacon(&robot, i, &beacon) == BSLAM_OK; i++) {
         fprintf(stderr, "beacon %d: x %.9g m, y %.9g m\n", (int)beacon.label, beacon.x_m, beacon.y_m);
     }
