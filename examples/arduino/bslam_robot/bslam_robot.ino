@@ -1,6 +1,6 @@
 // A robot with wheel encoders on interrupts and a tag detector on Serial1; its pose comes out on Serial.
-// For boards with a floating-point unit and 22 KB of RAM to spare: Portenta H7, Nano 33 BLE, Teensy 4, ESP32-S3;
-// others with fewer beacons and steps (examples/arduino/README.md).
+// For boards with a floating-point unit and 22 KB of RAM to spare: Portenta H7, Nano 33 BLE, Teensy 4,
+// ESP32-S3; others with fewer beacons and steps (examples/arduino/README.md).
 #include <bslam.h>
 
 // Your robot: pins of each encoder's two channels, and its measures (docs/TUNING.md says how to find them).
