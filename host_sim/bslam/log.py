@@ -55,6 +55,11 @@ SIGNATURES = "signatures.npy"
 SEEDS = "seeds.npy"
 """The file that holds signatures of things that are no beacon."""
 SEEDS_MAX = 128
+FILES = (
+    *(f"{stem}.csv{end}" for stem in ("odometry", "sightings", "truth", "beacons") for end in ("", ".gz")),
+    *(SIGNATURES, SEEDS, "robot.toml"),
+)
+"""All that a log folder may hold."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
 
 
@@ -326,13 +331,12 @@ def _write(log: Log, folder: Path) -> None:
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (folder / name).unlink(missing_ok=True)
         for stem, columns in tables.items():
-            for name in (f"{stem}.csv", f"{stem}.csv.gz"):
-                (folder / name).unlink(missing_ok=True)
             if columns is not None:
                 _write_csv(folder / f"{stem}.csv", columns)
         for name, values in ((SIGNATURES, sightings.signature), (SEEDS, log.seeds)):
-            (folder / name).unlink(missing_ok=True)
             if values is not None:
                 np.save(folder / name, values, allow_pickle=False)
         (folder / "robot.toml").write_text(robot_text(log.robot), encoding="utf-8")

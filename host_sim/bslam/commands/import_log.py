@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from bslam.errors import BslamError
-from bslam.log import WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot
+from bslam.log import FILES, WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot
+from bslam.options import RunOptions, core_params
 from bslam.parsing.settings import number, parse_table
 from bslam.ros2.importer import Request, import_bag
 from bslam.ros2.tags import HELP, SIDE_M, TagSizes, read_tag_sizes
@@ -30,13 +31,10 @@ one of its kind. Where the camera sits comes from /tf_static. Stamps are those o
 --tags: {HELP}
 Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
 
-_LOG_FILES = ("odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml")
-_OTHERS = (*(f"{name}.gz" for name in _LOG_FILES[:4]), "signatures.npy", "seeds.npy")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("format", choices=["ros2"], help="what the log is of")
+    parser.add_argument("format", choices=["ros2"], metavar="ros2", help="what the log is of")
     parser.add_argument("bag", type=Path, metavar="BAG", help="rosbag2 folder, FILE.mcap or FILE.db3")
     parser.add_argument("--odometry", metavar="TOPIC", help="nav_msgs/Odometry: poses become wheel travel")
     parser.add_argument("--detections", metavar="TOPIC", help="the markers")
@@ -64,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    out = arguments.out or Path("out/import") / arguments.bag.stem
+    out = arguments.out or Path("out/import") / arguments.bag.resolve().stem
     _require_place(out)
     imported = import_bag(arguments.bag, _request(arguments))
     _write(imported.log, out)
@@ -147,11 +145,12 @@ def _write(log: Log, out: Path) -> None:
         made = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
         try:
             log.write(made)
+            _require_usable(made, out)
             made.chmod(0o755)  # mkdtemp makes it private
             if not out.exists():
                 made.rename(out)
                 return
-            for name in _LOG_FILES + _OTHERS:
+            for name in FILES:
                 if (made / name).exists():
                     os.replace(made / name, out / name)
                 else:
@@ -160,3 +159,11 @@ def _write(log: Log, out: Path) -> None:
             shutil.rmtree(made, ignore_errors=True)
     except OSError as error:
         raise BslamError(f"--out {out}: cannot be written: {error}; allowed: a place to write to") from error
+
+
+def _require_usable(made: Path, out: Path) -> None:
+    """Whatever no file of a log may hold is found before a log that is there is replaced."""
+    try:
+        core_params(RunOptions(sensor="recorded"), Log.read(made))
+    except BslamError as error:
+        raise BslamError(str(error).replace(made.name, out.name)) from None

@@ -45,13 +45,14 @@ def read_identities(sightings: Table, beacons: Table | None) -> Identities:
         if table is None or BEACON_ID not in table.texts:
             continue
         texts = table.texts[BEACON_ID]
-        good = {text: _is_good(text) if text else bool(or_empty) for text in set(texts)}
+        good = {text: is_identity(text) if text else bool(or_empty) for text in set(texts)}
         table.require(BEACON_ID, np.array([good[text] for text in texts], np.bool_), _ALLOWED + or_empty)
         names |= {_name(text) for text in good if text}
     return Identities(tuple(sorted(names)) if not all(map(is_number, names)) else ())
 
 
-def _is_good(text: str) -> bool:
+def is_identity(text: str) -> bool:
+    """Whether a log may have it: a count, or a word that is no number."""
     if is_number(text):
         value = np.array([float(text)])
         return bool(is_count(value)[0] and value[0] <= BEACON_ID_MAX)

@@ -40,10 +40,9 @@ DEFINITIONS: Final = {
         "vision_msgs/BoundingBox3D bbox\nstring id"
     ),
     "vision_msgs/msg/Detection3DArray": "std_msgs/Header header\nvision_msgs/Detection3D[] detections",
-    "isaac_ros_apriltag_interfaces/msg/Point": "float64 x\nfloat64 y",
     "isaac_ros_apriltag_interfaces/msg/AprilTagDetection": (
-        "string family\nint32 id\nisaac_ros_apriltag_interfaces/Point center\n"
-        "isaac_ros_apriltag_interfaces/Point[4] corners\ngeometry_msgs/PoseWithCovarianceStamped pose"
+        "string family\nint32 id\ngeometry_msgs/Point center\n"
+        "geometry_msgs/Point[4] corners\ngeometry_msgs/PoseWithCovarianceStamped pose"
     ),
     "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": (
         "std_msgs/Header header\nisaac_ros_apriltag_interfaces/AprilTagDetection[] detections"

@@ -13,8 +13,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.errors import BslamError
+
 Floats = NDArray[np.float64]
 
+_LEVEL: Final = math.cos(0.1)  # of the angle between two frames' upward axes
 _UPRIGHT: Final = 0.5  # an axis whose level part is shorter points up or down
 DISTORTIONS: Final = ("", "plumb_bob", "rational_polynomial")
 _UNDISTORT_STEPS, _UNDISTORT_WITHIN = 50, 1e-4
@@ -54,7 +57,7 @@ class Transform:
 
 def _rotation(quaternion: tuple[float, float, float, float]) -> Floats:
     norm = math.sqrt(sum(one * one for one in quaternion))
-    x, y, z, w = (one / norm for one in quaternion) if norm > 0.0 else (0.0, 0.0, 0.0, 1.0)
+    x, y, z, w = (one / norm for one in quaternion) if norm != 0.0 else (0.0, 0.0, 0.0, 1.0)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -128,8 +131,8 @@ def on_ground(
     return (
         bearing_rad,
         range_m,
-        math.sqrt(across @ level @ across) / range_m,
-        math.sqrt(along @ level @ along),
+        math.sqrt(max(0.0, float(across @ level @ across))) / range_m,  # rounding may leave less than 0
+        math.sqrt(max(0.0, float(along @ level @ along))),
     )
 
 
@@ -275,6 +278,28 @@ def _turned(vectors: Floats) -> Floats:
     safe = np.where(angle > 1e-12, angle, 1.0)
     turn = _cross(vectors)
     return np.eye(3) + np.sin(safe) / safe * turn + (1.0 - np.cos(safe)) / safe**2 * (turn @ turn)
+
+
+def base_on(tree: Tree, body: str, base: str) -> Transform:
+    """The robot's frame on the frame that its odometry is of ("": the same).
+
+    Raises BslamError where nothing ties them, or one is tilted against the other: a heading is none then.
+    """
+    pose = pose_in(tree, body or base, base)
+    if pose is None:
+        raise BslamError(f"/tf_static has no way from {body}, the odometry's frame, to {base}")
+    if not (pose.rotation[2, 2] > _LEVEL and np.isfinite(pose.place_m).all()):
+        raise BslamError(f"/tf_static: {body}, the odometry's frame, is not level with {base}")
+    return pose
+
+
+def pose_of_part(body: tuple[float, float, float], part: Transform) -> tuple[float, float, float]:
+    """Where a part of a body stands: x, y, heading of the body on the ground, pose of the part on it."""
+    x_m, y_m, theta_rad = body
+    c, s = math.cos(theta_rad), math.sin(theta_rad)
+    dx_m, dy_m = (float(one) for one in part.place_m[:2])
+    turn_rad = math.atan2(part.rotation[1, 0], part.rotation[0, 0])
+    return x_m + c * dx_m - s * dy_m, y_m + s * dx_m + c * dy_m, theta_rad + turn_rad
 
 
 def frame_over(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from bslam.errors import BslamError
 from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
 from bslam.ros2.bag import Bag
-from bslam.ros2.geometry import DISTORTIONS, Camera, Transform, pose_in
+from bslam.ros2.geometry import DISTORTIONS, Camera, Transform, base_on, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
     CORNERS,
@@ -133,15 +134,15 @@ def import_bag(path: Path, request: Request) -> Imported:
         chosen = _choose(bag, request)
         read = _read(bag, chosen, request)
         kinds = dict(bag.topics)
-    travel = _travel(read, chosen, request, notes)
-    gyro_radps, gyro_said = _gyro(read, chosen, request, travel, notes)
+    travel = _travel(read, chosen, request, path, notes).after_pause(chosen.motion, notes)
+    gyro_radps, gyro_said = _gyro(read, chosen, request, travel, path, notes)
     markers = _markers(read, chosen, request, path)
     sightings, words = sightings_of(read.frames, markers, chosen.detections[0], notes)
     sightings = _within(sightings, travel, chosen, notes)
     robot, guessed = _robot(request, travel, sightings, markers, gyro_said)
     odometry = travel.wheels(robot.wheelbase_m, gyro_radps)
     truth = _truth(read, chosen, travel, notes)
-    log = Log(path.stem, odometry, sightings, truth, None, robot, words=words)
+    log = Log(path.resolve().stem, odometry, sightings, truth, None, robot, words=words)
     told = _told(read, chosen, kinds, log, markers)
     return Imported(log, (*told, *guessed, *(f"note: {one}" for one in notes)))
 
@@ -167,6 +168,8 @@ def _choose(bag: Bag, request: Request) -> _Chosen:
             f"{bag.listing(list(DETECTIONS))}; types: {', '.join(DETECTIONS)}"
         )
     truth, _, truth_frame = (request.truth or "").partition(":")
+    if request.truth is not None and not truth:
+        raise BslamError(f"--truth {request.truth!r}: no topic; allowed: TOPIC, or TOPIC:FRAME of /tf")
     chosen = _Chosen(
         detections,
         odometry,
@@ -212,11 +215,28 @@ def _read(bag: Bag, chosen: _Chosen, request: Request) -> _Read:
         read.span_ns[topic] = (read.span_ns.get(topic, (received_ns, 0))[0], received_ns)
         for name, take in takers:
             if name == topic:
-                take(message)
+                with _Named(f"{bag.path}: {topic}, message {read.counts[topic] - 1}"):
+                    take(message)
     for topic, option in ((chosen.motion, "odometry"), (chosen.detections[0], "detections")):
         if read.counts[topic] == 0:
             raise BslamError(f"{bag.path}: {topic} ({option}) holds no messages; allowed: a topic with some")
     return read
+
+
+class _Named:
+    """Says of which message an error is; fields of other kinds or sizes than usual may raise anything."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if isinstance(error, Exception):
+            raise BslamError(f"{self._what}: {error}") from error
 
 
 def _takers(read: _Read, chosen: _Chosen) -> list[tuple[str, Taker]]:
@@ -253,9 +273,10 @@ def _take_static(read: _Read, message: Any) -> None:
 # --- motion -------------------------------------------------------------------------------------------------
 
 
-def _travel(read: _Read, chosen: _Chosen, request: Request, notes: list[str]) -> Travel:
+def _travel(read: _Read, chosen: _Chosen, request: Request, path: Path, notes: list[str]) -> Travel:
     if chosen.joints is None:
-        return travel_of_poses(read.poses, chosen.motion, notes)
+        poses = read.poses if request.base is None else _of_base(read, request.base, path)
+        return travel_of_poses(poses, chosen.motion, notes)
     for option, value in (("--wheel-radius", request.wheel_radius_m), ("--wheelbase", _wheelbase(request))):
         if value is None:
             raise BslamError(
@@ -265,12 +286,37 @@ def _travel(read: _Read, chosen: _Chosen, request: Request, notes: list[str]) ->
     return travel_of_joints(read.joints, chosen.motion, radius_m, wheelbase_m, notes)
 
 
+def _of_base(read: _Read, base: str, path: Path) -> Poses:
+    """What the odometry tells of its child frame, of the robot's frame instead."""
+    try:
+        pose = base_on(read.tree, read.child, base)
+    except BslamError as error:
+        raise BslamError(
+            f"{path}: {error} (frames: {_frames(read)}); allowed: --base FRAME of these, or no --base"
+        ) from None
+    return read.poses.of_part(pose)
+
+
+def _pose_in(read: _Read, base: str, frame: str, path: Path) -> Transform | None:
+    """The pose of a frame in another by /tf_static; None: nothing ties them."""
+    pose = pose_in(read.tree, base, frame)
+    if pose is not None and not (np.isfinite(pose.rotation).all() and np.isfinite(pose.place_m).all()):
+        raise BslamError(
+            f"{path}: {TF_STATIC}: the way from {base} to {frame} has numbers that are not finite"
+        )
+    return pose
+
+
+def _frames(read: _Read) -> str:
+    return ", ".join(sorted(read.tree.keys() | {parent for parent, _ in read.tree.values()})) or "none"
+
+
 def _wheelbase(request: Request) -> float | None:
     return request.robot.get("wheelbase_m")
 
 
 def _gyro(
-    read: _Read, chosen: _Chosen, request: Request, travel: Travel, notes: list[str]
+    read: _Read, chosen: _Chosen, request: Request, travel: Travel, path: Path, notes: list[str]
 ) -> tuple[NDArray[np.float64] | None, dict[str, float]]:
     """Turn rates beside the odometry, and the gyro's noise as a key of robot.toml."""
     if chosen.imu is None:
@@ -278,7 +324,7 @@ def _gyro(
     if not read.gyro.stamps_ns:
         raise BslamError(f"{chosen.imu[0]} (--imu) holds no messages; allowed: a topic with some")
     base = _base(read, request)
-    pose = pose_in(read.tree, base, read.gyro.frame_id)
+    pose = _pose_in(read, base, read.gyro.frame_id, path)
     if pose is None:
         notes.append(f"{chosen.imu[0]}: no way from {base} to {read.gyro.frame_id}; its z is taken as up")
         pose = Transform(np.eye(3), np.zeros(3))
@@ -314,12 +360,11 @@ def _camera_pose(read: _Read, request: Request, frame: str, path: Path) -> Trans
     if request.mount is not None:
         return Transform.of_camera(*request.mount)
     base = _base(read, request)
-    pose = pose_in(read.tree, base, frame)
+    pose = _pose_in(read, base, frame, path)
     if pose is None:
-        there = ", ".join(sorted(read.tree.keys() | {parent for parent, _ in read.tree.values()}))
         raise BslamError(
             f"{path}: {TF_STATIC} has no way from {base} to {frame}, the camera's frame (frames: "
-            f"{there or 'none'}); allowed: --base FRAME of these, or --mount X_M,Y_M,YAW_RAD of the camera"
+            f"{_frames(read)}); allowed: --base FRAME of these, or --mount X_M,Y_M,YAW_RAD of the camera"
         )
     return pose
 
@@ -359,9 +404,8 @@ def _require_usable(camera: Camera, topic: str, rectified: bool | None) -> None:
 
 def _within(sightings: Sightings, travel: Travel, chosen: _Chosen, notes: list[str]) -> Sightings:
     """Those while odometry runs; a frame may be as late as rows are apart."""
-    start_us, end_us = int(travel.time_us[0]), int(travel.time_us[-1])
-    late_us = int(np.median(np.diff(travel.time_us)))
-    kept = (sightings.time_us >= start_us) & (sightings.time_us <= end_us + late_us)
+    start_us, end_us = travel.start_us, int(travel.time_us[-1])
+    kept = (sightings.time_us >= start_us) & (sightings.time_us <= end_us + travel.step_us)
     if not kept.any():
         seen = sightings.time_us[[0, -1]] * 1e-6 if len(kept) else np.full(2, math.nan)
         raise BslamError(
@@ -385,14 +429,17 @@ def _truth(read: _Read, chosen: _Chosen, travel: Travel, notes: list[str]) -> Tr
     topic = chosen.truth[0]
     if not read.truth:
         raise BslamError(f"{topic} (--truth) holds no pose of {chosen.truth_frame or 'anything'}")
-    order = in_order([one.time_ns for one in read.truth], topic, notes)
-    time_us = np.array([read.truth[i].time_ns // 1000 for i in order], dtype=np.int64)
+    told = [one for one in read.truth if np.isfinite([one.x_m, one.y_m, one.theta_rad]).all()]
+    if len(told) < len(read.truth):
+        notes.append(f"{topic}: left out {len(read.truth) - len(told)} poses that are not finite")
+    order = in_order([one.time_ns for one in told], topic, notes)
+    time_us = np.array([told[i].time_ns // 1000 for i in order], dtype=np.int64)
     kept = without_repeats(time_us, topic, notes)
-    kept &= (time_us >= travel.time_us[0]) & (time_us <= travel.time_us[-1])
+    kept &= (time_us >= travel.start_us) & (time_us <= travel.time_us[-1])
     if not kept.any():
         raise BslamError(f"{topic} (--truth): no pose while odometry runs; allowed: stamps of one clock")
     x_m, y_m, theta_rad = (
-        np.array([getattr(read.truth[i], name) for i in order])[kept] for name in ("x_m", "y_m", "theta_rad")
+        np.array([getattr(told[i], name) for i in order])[kept] for name in ("x_m", "y_m", "theta_rad")
     )
     return Truth(time_us[kept], x_m, y_m, theta_rad)
 
@@ -404,7 +451,7 @@ def _robot(
     mount, is_told = markers.mount, sightings.bearing_sd_rad is not None
     view_rad, view_said = _field_of_view(sightings, markers)
     known = {
-        "step_us": max(1, int(np.median(np.diff(travel.time_us)))),
+        "step_us": travel.step_us,
         "field_of_view_rad": view_rad,
         "sensor_x_m": mount.x_m,
         "sensor_y_m": mount.y_m,

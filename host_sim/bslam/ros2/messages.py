@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.errors import BslamError
 from bslam.ros2.geometry import Camera, Transform, yaw_of
 
 Floats = NDArray[np.float64]
@@ -93,6 +94,9 @@ def _isaac_apriltags(message: Any) -> Iterator[Frame]:
 
 
 def _aruco_markers(message: Any) -> Iterator[Frame]:
+    count = len(message.marker_ids), len(message.poses)
+    if count[0] != count[1]:
+        raise BslamError(f"{count[0]} marker_ids and {count[1]} poses; allowed: as many of each")
     pairs = zip(message.marker_ids, message.poses, strict=True)
     yield _one_frame(message.header, (Detection(str(int(i)), _xyz(pose.position)) for i, pose in pairs))
 
@@ -202,9 +206,10 @@ POSES: Final[dict[str, Callable[[Any, str], Iterator[PlanarPose]]]] = {
 """Messages that hold poses, and how each is read."""
 
 
-def twist_of(message: Any) -> tuple[float, float]:
-    """Speed ahead, m/s, and turn rate, rad/s, of an Odometry."""
-    return float(message.twist.twist.linear.x), float(message.twist.twist.angular.z)
+def twist_of(message: Any) -> tuple[float, float, float]:
+    """Speed ahead and to the left, m/s, and turn rate, rad/s, of an Odometry, in its child frame."""
+    speed = message.twist.twist.linear
+    return float(speed.x), float(speed.y), float(message.twist.twist.angular.z)
 
 
 def transforms_of(message: Any) -> Iterator[tuple[str, str, Transform]]:

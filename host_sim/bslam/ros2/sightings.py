@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.log import Sightings
-from bslam.parsing.identities import BEACON_ID_MAX, WORD_MAX
+from bslam.parsing.csvtable import is_number
+from bslam.parsing.identities import BEACON_ID_MAX, WORD_MAX, is_identity
 from bslam.ros2.geometry import Camera, Mount, Transform, on_ground, place_tags
 from bslam.ros2.messages import Detection, Frame
 from bslam.ros2.stamps import in_order
@@ -25,6 +26,7 @@ RANGE_LEFT: Final = 0.01
 """What calibration leaves: noise beside that of the corners; of a distance, a part of it."""
 _BEARING_SD_RAD, _RANGE_SD_M = (1e-5, math.pi), (1e-3, 1e4)  # as a log may have them
 _FARTHEST_M = 1e6
+_ROUNDING: Final = 1e-6  # of a covariance's largest eigenvalue, as numbers of 32 bits leave it
 _MIDDLE: Final = Mount(0.0, 0.0, 0.0)
 _COLUMNS: Final = ("bearing_rad", "range_m", "bearing_sd_rad", "range_sd_m", "label", "mappable")
 
@@ -48,12 +50,16 @@ class Markers:
         return Mount.of(only[0]) if len(only) == 1 else _MIDDLE
 
     def placed(self, detections: Sequence[Detection]) -> list[Detection | None]:
-        """Each with its place, which corners are turned into; None: it has none in front of the camera."""
+        """Each with its place, which corners are turned into; None: it has none in front of the camera.
+
+        An identity that is a number but no count, as -1 for a marker that is not known, becomes none; so does
+        a covariance that can be none.
+        """
         seen = [i for i, one in enumerate(detections) if one.corners_px is not None]
         found = list(detections)
         for i, place in zip(seen, self._of_corners([detections[i] for i in seen]), strict=True):
             found[i] = place
-        return [one if _is_place(one) else None for one in found]
+        return [_cleared(one) if _is_place(one) else None for one in found]
 
     def _of_corners(self, detections: Sequence[Detection]) -> list[Detection]:
         if not detections:
@@ -66,13 +72,17 @@ class Markers:
         columns = zip(detections, places, covariances, strict=True)
         return [Detection(one.identity, place, covariance) for one, place, covariance in columns]
 
-    def sight(self, frame_id: str, placed: Detection, mount: Mount) -> tuple[float, float, float, float]:
-        """Bearing, range, and the sd of each (0: as the robot has it)."""
+    def sight(
+        self, frame_id: str, placed: Detection, mount: Mount
+    ) -> tuple[float, float, float, float] | None:
+        """Bearing, range, and the sd of each (0: as the robot has it); None: it is right above the mount."""
         assert placed.position_m is not None
         told = placed.covariance_m2
         bearing_rad, range_m, bearing_sd, range_sd = on_ground(
             placed.position_m, told, self.poses[frame_id], mount
         )
+        if not range_m > 0.0:
+            return None
         if told is None:
             return bearing_rad, range_m, 0.0, 0.0
         bearing_sd = math.hypot(bearing_sd, BEARING_LEFT_RAD)
@@ -82,15 +92,14 @@ class Markers:
     def columns(self, frame: Frame, words: dict[str, int]) -> dict[str, list[Any]]:
         """A frame as `Slam.sightings` takes it, seen from the robot's middle, with its detector's noise.
 
-        So the filter needs no mount, and any number of cameras will do. words: the labels of identities that
-        are no numbers; new ones are added.
+        So the filter needs no mount, and any number of cameras will do. words: the label of each identity;
+        new ones are added. Without an identity the label is -1.
         """
         columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         for one in self.placed(frame.detections):
-            if one is not None:
-                number = one.identity.rpartition(":")[2]
-                label = int(number) if number.isdecimal() else words.setdefault(one.identity, len(words))
-                sight = self.sight(frame.frame_id, one, _MIDDLE)
+            sight = None if one is None else self.sight(frame.frame_id, one, _MIDDLE)
+            if one is not None and sight is not None:
+                label = words.setdefault(one.identity, len(words)) if one.identity else -1
                 for name, value in zip(_COLUMNS, (*sight, label, True), strict=True):
                     columns[name].append(value)
         return columns
@@ -98,6 +107,19 @@ class Markers:
 
 def _is_place(one: Detection) -> bool:
     return one.position_m is not None and 0.0 < float(np.linalg.norm(one.position_m)) < _FARTHEST_M
+
+
+def _cleared(one: Detection) -> Detection:
+    """Without an identity or a covariance that can be none."""
+    known = is_identity(one.identity) or not is_number(one.identity)
+    told = one.covariance_m2 is not None and _is_covariance(one.covariance_m2)
+    identity, covariance_m2 = one.identity if known else "", one.covariance_m2 if told else None
+    return replace(one, identity=identity, covariance_m2=covariance_m2)
+
+
+def _is_covariance(matrix: Floats) -> bool:
+    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+    return bool(values[0] >= -_ROUNDING * values[-1])
 
 
 def _within(value: float, limits: tuple[float, float]) -> float:
@@ -113,22 +135,31 @@ def sightings_of(
     """
     order, mount = in_order([one.time_ns for one in frames], topic, notes), markers.mount
     rows = [(frames[i], one) for i in order for one in frames[i].detections]
-    texts, numbers, lost, twice = list[str](), list[tuple[float, ...]](), 0, 0
+    texts, numbers = list[str](), list[tuple[float, ...]]()
+    lost = twice = unknown = odd = 0
     seen: set[tuple[int, str, str]] = set()
     for (frame, one), placed in zip(rows, markers.placed([one for _, one in rows]), strict=True):
-        key = (frame.time_ns // 1000, frame.frame_id, one.identity)
-        if one.identity and key in seen:
-            twice += 1
-        elif placed is None:
+        sight = None if placed is None else markers.sight(frame.frame_id, placed, mount)
+        if placed is None or sight is None:
             lost += 1
-        else:
-            seen.add(key)
-            texts.append(one.identity)
-            numbers.append((float(key[0]), *markers.sight(frame.frame_id, placed, mount)))
-    if twice:
-        notes.append(f"{topic}: left out {twice} markers that their frame has already")
-    if lost:
-        notes.append(f"{topic}: left out {lost} markers without a place in front of the camera")
+            continue
+        key = (frame.time_ns // 1000, frame.frame_id, placed.identity)
+        if placed.identity and key in seen:
+            twice += 1
+            continue
+        unknown += placed.identity != one.identity
+        odd += one.covariance_m2 is not None and placed.covariance_m2 is None
+        seen.add(key)
+        texts.append(placed.identity)
+        numbers.append((float(key[0]), *sight))
+    for count, said in (
+        (twice, "left out {} markers that their frame has already"),
+        (lost, "left out {} markers without a place in front of the camera"),
+        (unknown, "{} markers have a number that is no count; their identity counts as unknown"),
+        (odd, "{} markers have a covariance that is none (a negative eigenvalue); it is left out"),
+    ):
+        if count:
+            notes.append(f"{topic}: {said.format(count)}")
     return _table(texts, numbers)
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from bslam.errors import BslamError
 from bslam.parsing.csvtable import Column, read_table
 from bslam.parsing.settings import Rule, check_keys, load_toml, number
@@ -55,6 +57,8 @@ def read_tag_sizes(path: Path) -> TagSizes:
         names = Column("the number of a tag, or family:number", lambda one: one >= 0, words=True)
         table = read_table(path, [{"id": names, "side_m": column}])
         table.require_rows(f"allowed: {HELP}")
+        first = np.isin(np.arange(table.rows), np.unique(table.texts["id"], return_index=True)[1])
+        table.require("id", first, "a tag that no line above has")
         return TagSizes(dict(zip(table.texts["id"], table.values["side_m"].tolist(), strict=True)))
     if path.suffix != ".toml":
         raise BslamError(f"{path}: allowed: FILE.toml or FILE.csv; {HELP}")

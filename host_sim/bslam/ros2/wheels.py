@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.log import Odometry, wrap_rad
-from bslam.ros2.geometry import Transform
+from bslam.ros2.geometry import Transform, pose_of_part
 from bslam.ros2.messages import PlanarPose, time_ns, turn_rate_of, twist_of
 from bslam.ros2.stamps import in_order, without_repeats
 
@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 JUMP_MPS, JUMP_M = 10.0, 1.0
 """An odometry that moves faster, and so far at once, was set anew."""
 SIDEWAYS_SHARE = 0.05
+_FIRST_STEPS_MAX = 2
 GYRO_SD_RADPS = 0.02
 """Of a gyro that does not say."""
 
@@ -28,11 +29,22 @@ class Poses:
     """What an odometry topic told, message by message."""
 
     poses: list[PlanarPose] = field(default_factory=list)
-    twists: list[tuple[float, float]] = field(default_factory=list)
+    twists: list[tuple[float, float, float]] = field(default_factory=list)  # as `twist_of` has them
 
     def add(self, pose: PlanarPose, message: Any) -> None:
         self.poses.append(pose)
         self.twists.append(twist_of(message))
+
+    def of_part(self, part: Transform) -> Poses:
+        """The same of another frame, fixed on the one that they are of."""
+        told = Poses()
+        (c, s), (dx_m, dy_m) = part.rotation[:2, 0], part.place_m[:2]
+        for one, (ahead, aside, turn) in zip(self.poses, self.twists, strict=True):
+            pose = pose_of_part((one.x_m, one.y_m, one.theta_rad), part)
+            told.poses.append(PlanarPose(one.time_ns, *pose))
+            ahead, aside = ahead - turn * dy_m, aside + turn * dx_m
+            told.twists.append((c * ahead + s * aside, c * aside - s * ahead, turn))
+        return told
 
 
 @dataclass(frozen=True)
@@ -42,6 +54,26 @@ class Travel:
     time_us: NDArray[np.int64]  # (n,)
     way_m: Floats  # (n - 1,)
     turn_rad: Floats  # (n - 1,)
+
+    @property
+    def step_us(self) -> int:
+        """The usual time from message to message."""
+        return max(1, int(np.median(np.diff(self.time_us))))
+
+    @property
+    def start_us(self) -> int:
+        """When a log of it starts: a step before its first row."""
+        return int(self.time_us[1]) - self.step_us
+
+    def after_pause(self, topic: str, notes: list[str]) -> Travel:
+        """Without messages before a first pause: a log has no way to say how long its first row took."""
+        dt_us = np.diff(self.time_us)
+        first = int(np.argmax(dt_us <= _FIRST_STEPS_MAX * self.step_us))
+        if first == 0:
+            return self
+        pause_s = int(dt_us[:first].max()) * 1e-6
+        notes.append(f"{topic}: left out {first} messages at the start: a pause of {pause_s:.1f} s follows")
+        return Travel(self.time_us[first:], self.way_m[first:], self.turn_rad[first:])
 
     def wheels(self, wheelbase_m: float, gyro_radps: Floats | None = None) -> Odometry:
         half_m = 0.5 * wheelbase_m * self.turn_rad
@@ -68,7 +100,7 @@ def travel_of_poses(told: Poses, topic: str, notes: list[str]) -> Travel:
         notes.append(f"{topic}: the pose never changes; its speeds are taken")
         by_twist[:] = True
     way_m = np.where(by_twist, twist[1:, 0] * dt_s, way_m)
-    turn_rad = np.where(by_twist, twist[1:, 1] * dt_s, turn_rad)
+    turn_rad = np.where(by_twist, twist[1:, 2] * dt_s, turn_rad)
     ahead_m, sideways_m = np.abs(way_m).sum(), np.abs(aside_m[~by_twist]).sum()
     if sideways_m > SIDEWAYS_SHARE * (ahead_m + sideways_m):
         notes.append(

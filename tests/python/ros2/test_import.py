@@ -2,9 +2,10 @@
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +15,28 @@ from bslam.evaluation.metrics import evaluate, summarise
 from bslam.log import Log, first_steps
 from bslam.logcheck.check import check_log
 from bslam.options import RunOptions
+from bslam.ros2.geometry import Transform, pose_of_part
 from bslam.ros2.importer import Request, import_bag
 from bslam.ros2.tags import TagSizes
 from bslam.runs.runner import run_log
-from ros2.bags import CAMERA, EPOCH_NS, MADE_UP, SIDE_M, STORE, Drive, Said, header, new, parts, write_bag
+from ros2.bags import (
+    CAMERA,
+    EPOCH_NS,
+    MADE_UP,
+    SIDE_M,
+    STORE,
+    Drive,
+    Said,
+    header,
+    new,
+    parts,
+    point,
+    pose,
+    quaternion,
+    transform,
+    write_bag,
+    yawed,
+)
 
 EPOCH_US = EPOCH_NS // 1000
 SIZES = TagSizes({}, SIDE_M)
@@ -182,10 +201,14 @@ BAD = {
     "{tags} --joints /joint_states --image raw --tag-size 0.3": "--wheel-radius METRES, which is missing",
     "{tags} --joints /joint_states --left-joint l --wheel-radius 0.1 --wheelbase 0.3": "--left-joint",
     "{aruco} --tag-size 0.3": "sizes of tags have no use",
-    "{aruco} --base nowhere": "no way from nowhere to camera_optical_frame",
+    "{aruco} --base nowhere": "no way from base_link, the odometry's frame, to nowhere",
     "{aruco} --mount 1,2": "allowed: X_M,Y_M,YAW_RAD",
     "{aruco} --truth /tf_static": "--truth /tf_static:CHILD_FRAME",
     "{aruco} --set wheelbas_m=0.3": "--set, key wheelbas_m: no such key",
+    "{aruco} --truth :base_link": "--truth ':base_link': no topic; allowed: TOPIC, or TOPIC:FRAME",
+    "{aruco} --set counter_bits=16": "log/robot.toml, key left_radius_m: is missing",
+    "{aruco} --set settings={{bearing_sd_rat=1}}": "key bearing_sd_rat: no such setting",
+    "{aruco} --base imu_link": "base_link, the odometry's frame, is not level with imu_link",
     "{aruco} --set wheelbase_m": "allowed: KEY=VALUE",
     "{aruco} --wheelbase 300": "--wheelbase: 300.0 is not allowed",
     "{tmp}/none": "no such bag",
@@ -208,6 +231,131 @@ def assert_refused(tmp_path: Path, words: str, said: str, capsys: pytest.Capture
     assert told.out == "" and told.err.count("\n") == 1
     assert said in told.err
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.fixture
+def start(drive: Drive) -> Drive:
+    return replace(drive, log=_beginning(drive.log))
+
+
+def changed(said: Iterable[Said], change: Callable[[Any], None], every: int = 7) -> list[Said]:
+    """One message of so many, changed."""
+    listed = list(said)
+    for one in listed[3::every]:
+        change(one[3])
+    return listed
+
+
+def logged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], said: Iterable[Said], *words: str
+) -> tuple[Log, str]:
+    """The log that the command leaves, and what it says."""
+    bag = write_bag(tmp_path / "bag", said)
+    assert (
+        main(["import", "ros2", str(bag), "--wheelbase", "0.4", "--out", str(tmp_path / "log"), *words]) == 0
+    )
+    return Log.read(tmp_path / "log"), capsys.readouterr().out
+
+
+@pytest.mark.parametrize("word", ["-1", "-3", "nan", "1.5"])
+def test_a_number_that_is_no_count_is_no_identity(
+    tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str], word: str
+) -> None:
+    def change(message: Any) -> None:
+        if word == "-1":
+            message.marker_ids[:1] = -1
+        for one in [] if word == "-1" else message.detections[:1]:
+            one.results[0].hypothesis.class_id = word
+
+    seen = start.aruco() if word == "-1" else start.detections_3d()
+    log, said = logged(tmp_path, capsys, [*start.odometry(), *start.static(), *changed(seen, change)])
+    unknown = int((log.sightings.beacon_id < 0).sum())
+    assert 0 < unknown < len(log.sightings.time_us)
+    assert f"{unknown} markers have a number that is no count" in said
+    assert log.words == ()
+
+
+def test_poses_of_the_truth_that_are_no_numbers_are_left_out(
+    tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def change(message: Any) -> None:
+        message.pose.position.x = message.pose.orientation.w = math.nan
+
+    said = [*start.odometry(), *start.static(), *start.aruco(), *changed(start.truth(), change, 20)]
+    log, told = logged(tmp_path, capsys, said, "--truth", "/mocap")
+    assert "poses that are not finite" in told
+    assert log.truth is not None and len(log.truth.time_us) == 61 - len(range(3, 61, 20))
+
+
+def test_a_marker_right_above_the_camera_has_no_bearing(
+    tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def change(message: Any) -> None:
+        message.poses[0].position = point((0.0, -1.0, 0.0))
+
+    said = [*start.odometry(), *changed(start.aruco(), change)]
+    log, told = logged(tmp_path, capsys, said, "--mount", "0,0,0")
+    assert "markers without a place in front of the camera" in told
+    assert (log.sightings.range_m > 0.0).all()
+
+
+def test_a_covariance_that_is_none_is_left_out(
+    tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def change(message: Any) -> None:
+        for one in message.detections:
+            covariance = np.full((6, 6), 5e-4)
+            np.fill_diagonal(covariance, 1e-4)
+            one.results[0].pose.covariance = covariance.ravel()
+
+    said = [*start.odometry(), *start.static(), *changed(start.detections_3d(), change, 1)]
+    log, told = logged(tmp_path, capsys, said)
+    assert "markers have a covariance that is none" in told
+    assert log.sightings.bearing_sd_rad is None
+
+
+def test_the_base_may_be_another_frame_than_that_of_the_odometry(tmp_path: Path, start: Drive) -> None:
+    """The same drive, told of a frame that is ahead of the base and turned to its left."""
+    vio = Transform.of((0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)), np.array([0.3, 0.1, 0.0]))
+    tie = transform(EPOCH_NS, "base_link", "vio", vio.place_m, quaternion(vio.rotation))
+    static = [
+        (EPOCH_NS, "/tf_static", "tf2_msgs/msg/TFMessage", new("tf2_msgs/msg/TFMessage", transforms=[tie]))
+    ]
+
+    def of_vio(message: Any) -> None:
+        at = message.pose.pose
+        yaw = 2.0 * math.atan2(at.orientation.z, at.orientation.w)
+        x, y, theta = pose_of_part((at.position.x, at.position.y, yaw), vio)
+        message.child_frame_id, message.pose.pose = "vio", pose((x, y, 0.0), yawed(theta))
+
+    odometry = [(t, n, k, m) for t, n, k, m in changed(start.odometry(), of_vio, 1)[3:]]
+    seen = [*start.aruco(), *start.static(), *static]
+    log = imported(write_bag(tmp_path / "vio", [*odometry, *seen]), base="base_link")
+    direct = imported(write_bag(tmp_path / "base", [*list(start.odometry())[3:], *seen]))
+    np.testing.assert_allclose(log.odometry.a, direct.odometry.a, atol=1e-9)
+    np.testing.assert_allclose(log.odometry.b, direct.odometry.b, atol=1e-9)
+
+
+def test_odometry_before_a_first_pause_is_left_out(
+    tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, *rest = start.odometry()
+    said = [first, *rest[20:], *start.aruco(), *start.static(), *start.truth()]
+    log, told = logged(tmp_path, capsys, said, "--truth", "/mocap")
+    assert "/odom: left out 1 messages at the start: a pause of 0.8 s follows" in told
+    begins_us = int(log.odometry.time_us[0]) - log.robot.step_us
+    assert begins_us == EPOCH_US + 21 * 40_000
+    assert log.truth is not None
+    assert min(log.sightings.time_us[0], log.truth.time_us[0]) >= begins_us
+
+
+def test_a_bag_in_the_present_folder_gives_its_name(
+    tmp_path: Path, start: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = write_bag(tmp_path / "bag", parts(start.odometry(), start.aruco(), start.static()))
+    monkeypatch.chdir(bag)
+    assert main(["import", "ros2", "."]) == 0
+    Log.read(bag / "out" / "import" / "bag")
 
 
 def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
@@ -245,7 +393,18 @@ def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
         yield f"lens {why[-10:]}", [*odometry, *start.apriltags(), *static, *lens.camera_info()], why
     empty = "ros2_aruco_interfaces/msg/ArucoMarkers"
     none = [(EPOCH_NS, "/aruco_markers", empty, new(empty, header=header(EPOCH_NS)))]
+    unequal = changed(start.aruco(), lambda message: message.poses.pop())
+    yield "unequal", [*odometry, *unequal, *static], "/aruco_markers, message 3: "
+    turned = [_untold(one) for one in start.static()]
+    yield "no turn", [*odometry, *aruco, *turned], "has numbers that are not finite"
+    lost = changed(start.odometry(), lambda message: setattr(message.pose.pose.orientation, "w", math.nan))
+    yield "no heading", [*lost, *aruco, *static], "/odom: message 3 has numbers that are not finite"
     yield "never a marker", [*odometry, *none, *static], "hold no marker"
+
+
+def _untold(said: Said) -> Said:
+    said[3].transforms[2].transform.rotation.w = math.nan
+    return said
 
 
 def _unstamped(said: Said) -> Said:
@@ -307,6 +466,19 @@ def test_out_may_not_be_a_file(tmp_path: Path, aruco: Path, capsys: pytest.Captu
     assert_refused(tmp_path, str(aruco), "there is a file of that name", capsys)
 
 
-def test_definitions_here_are_those_of_the_messages() -> None:
-    for kind in ("apriltag_msgs/msg/AprilTagDetectionArray", "vision_msgs/msg/Detection3DArray"):
-        assert STORE.deserialize_cdr(STORE.serialize_cdr(new(kind), kind), kind) is not None
+# Of the .msg files in the repositories of the packages, as REP-2011 has a type hashed.
+PUBLISHED = {  # christianrauch/apriltag_msgs 84bd66c, NVIDIA-ISAAC-ROS/isaac_ros_common d716470,
+    # JMU-ROBOTICS-VIVA/ros2_aruco e7b4fc7, fictionlab/ros_aruco_opencv 3e82a03, pal-robotics/aruco_ros
+    # fb95d1e, ros-perception/vision_msgs e77fa2d
+    "apriltag_msgs/msg/AprilTagDetectionArray": "6016bfe513a7c741ccbdbc64",
+    "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": "45595f343aa66856ae56aee8",
+    "ros2_aruco_interfaces/msg/ArucoMarkers": "161456de7e598cd0907347ee",
+    "aruco_opencv_msgs/msg/ArucoDetection": "4932ea28a112a7aff8ae8d36",
+    "aruco_msgs/msg/MarkerArray": "690e8d9bfc13f5df5e7ac0e7",
+    "vision_msgs/msg/Detection3DArray": "793f5eab9595ac1c0da07873",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "published"), PUBLISHED.items())
+def test_definitions_here_are_those_of_the_packages(kind: str, published: str) -> None:
+    assert STORE.hash_rihs01(kind).startswith(f"RIHS01_{published}")

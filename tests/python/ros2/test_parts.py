@@ -123,6 +123,7 @@ def test_range_is_along_the_ground_and_noise_is_split() -> None:
 def test_yaw_of_quaternions_that_are_not_of_unit_length() -> None:
     assert yaw_of((0.0, 0.0, 2.0 * math.sin(0.4), 2.0 * math.cos(0.4))) == pytest.approx(0.8)
     assert yaw_of((0.0, 0.0, 0.0, 0.0)) == 0.0
+    assert math.isnan(yaw_of((0.0, 0.0, math.nan, 1.0)))
 
 
 def test_map_over_odometry_and_ellipses() -> None:
@@ -153,7 +154,8 @@ def test_stamps_are_sorted_noted_or_refused() -> None:
 
 
 def told(rows: list[tuple[int, float, float, float]], twist: tuple[float, float] = (0.0, 0.0)) -> Poses:
-    return Poses([PlanarPose(t * 10**9, x, y, th) for t, x, y, th in rows], [twist] * len(rows))
+    twists = [(twist[0], 0.0, twist[1])] * len(rows)
+    return Poses([PlanarPose(t * 10**9, x, y, th) for t, x, y, th in rows], twists)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3, 3))
@@ -281,6 +283,11 @@ def test_sizes_by_number_family_and_default(tmp_path: Path) -> None:
         ("t.toml", "default_m = 'a'\n", "key default_m: 'a' is not allowed"),
         ("t.toml", "[", "not TOML"),
         ("t.csv", "id,side_m\n5,-1\n", "line 2, column side_m: '-1' is not allowed"),
+        (
+            "t.csv",
+            "id,side_m\n5,0.2\n5,0.3\n",
+            "column id: '5' is not allowed; allowed: a tag that no",
+        ),
         ("t.csv", "id,side_m\n", "no rows below the header"),
         ("t.yaml", "", "allowed: FILE.toml or FILE.csv"),
     ],
