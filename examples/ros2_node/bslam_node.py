@@ -13,8 +13,8 @@ from sensor_msgs.msg import CameraInfo
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from bslam import CoreError, Slam
-from bslam.ros2.geometry import ellipse_95, frame_over, pose_in
+from bslam import BslamError, Slam
+from bslam.ros2.geometry import base_on, ellipse_95, frame_over, pose_in, pose_of_part
 from bslam.ros2.messages import CORNERS, ODOMETRY, camera_of, frames_of, poses_of, transforms_of
 from bslam.ros2.sightings import Markers
 from bslam.ros2.tags import TagSizes
@@ -42,14 +42,12 @@ class BslamNode(Node):
 
     def __init__(self) -> None:
         super().__init__("bslam")
-        p = {name: self.declare_parameter(name, value).value for name, value in PARAMETERS.items()}
-        self.p = p
+        self.p = p = {name: self.declare_parameter(name, value).value for name, value in PARAMETERS.items()}
         speeds = dict.fromkeys(("left_speed_sd_mps", "right_speed_sd_mps"), p["wheel_speed_sd_mps"])
         sensor = {name: p[name] for name in ("wheelbase_m", "bearing_sd_rad", "range_sd_fraction")}
         self.slam = Slam({**sensor, **speeds}, beacons_max=80)
-        self.tree, self.camera, self.last, self.waiting = {}, None, None, []
-        self.words: dict[str, int] = {}  # labels of identities that are no numbers
-        self.frames = 0
+        self.tree, self.camera, self.last, self.waiting, self.frames = {}, None, None, [], 0
+        self.words: dict[str, int] = {}  # labels of identities
         self.pose_out = self.create_publisher(PoseWithCovarianceStamped, "~/pose", 10)
         self.map_out = self.create_publisher(MarkerArray, "~/map", 10)
         self.tf_out = self.create_publisher(TFMessage, "/tf", 100)
@@ -67,18 +65,24 @@ class BslamNode(Node):
         self.camera = camera_of(message, self.p["rectified"])
 
     def on_detections(self, message) -> None:
-        """They wait for the odometry that covers them, and are taken at their own stamps."""
-        self.waiting += frames_of(self.p["detections_type"], message)
+        try:
+            self.waiting += frames_of(self.p["detections_type"], message)  # until odometry covers them
+        except BslamError as refusal:
+            self.get_logger().warning(str(refusal))
 
     def on_odometry(self, message) -> None:
         (pose,) = poses_of(ODOMETRY, message)
-        now_us, at = pose.time_ns // 1000, (pose.x_m, pose.y_m, pose.theta_rad)
+        now_us = pose.time_ns // 1000
         try:
+            base = base_on(self.tree, message.child_frame_id, self.p["base_frame"])
+            at = pose_of_part((pose.x_m, pose.y_m, pose.theta_rad), base)
+            if not np.isfinite(at).all():
+                raise BslamError("odometry left out: its pose is not finite")
             if self.last is None:
                 self.slam.sightings(now_us, [], [], [], [])  # an empty frame starts the clock
             else:
                 self.move(now_us, at)
-        except CoreError as refusal:  # a stamp that runs back, say: the next message covers this one's way
+        except BslamError as refusal:  # a stamp that runs back, say: the next message covers this one's way
             self.get_logger().warning(str(refusal))
             return
         self.last = now_us, at
@@ -102,16 +106,14 @@ class BslamNode(Node):
             missing = "camera_info" if camera_pose else f"way to {frame.frame_id} in /tf_static"
             self.get_logger().warning(f"frame left out: no {missing} yet", throttle_duration_sec=5.0)
             return
-        sizes = TagSizes({}, self.p["tag_size_m"])
-        markers = Markers({frame.frame_id: camera_pose}, sizes, self.camera, pixel_sd=0.5)
+        markers = Markers({frame.frame_id: camera_pose}, TagSizes({}, self.p["tag_size_m"]), self.camera, 0.5)
         try:
             self.slam.sightings(frame.time_ns // 1000, **markers.columns(frame, self.words))
-        except CoreError as refusal:
+        except BslamError as refusal:
             self.get_logger().warning(str(refusal))
         if self.frames % FRAMES_PER_MAP == 0:
-            self.map_out.publish(
-                MarkerArray(markers=[self.ellipse(one, stamp) for one in self.slam.beacons()])
-            )
+            ellipses = [self.ellipse(one, stamp) for one in self.slam.beacons()]
+            self.map_out.publish(MarkerArray(markers=ellipses))
         self.frames += 1
 
     def publish(self, header, odometry: tuple) -> None:

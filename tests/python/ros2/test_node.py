@@ -3,6 +3,7 @@
 import math
 import runpy
 import sys
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from bslam.motion import move_on_arc
+from bslam.ros2.geometry import Transform, pose_of_part
 from ros2.bags import EPOCH_NS, SIDE_M, STORE, Drive, Said, new, parts
 
 NODE = Path(__file__).parents[3] / "examples" / "ros2_node" / "bslam_node.py"
@@ -95,11 +97,12 @@ def checked(name: str, message: Any) -> Any:
     return STORE.deserialize_cdr(STORE.serialize_cdr(message, name), name)
 
 
-def drive_node(bus: Bus, said: list[Said], **parameters: Any) -> None:
+def drive_node(bus: Bus, said: Sequence[Said], **parameters: Any) -> Any:
     bus.parameters = {"wheelbase_m": 0.4, **parameters}
-    runpy.run_path(str(NODE))["BslamNode"]()
+    node = runpy.run_path(str(NODE))["BslamNode"]()
     for one in sorted(said, key=lambda one: one[0]):
         bus.send(one)
+    return node
 
 
 def pose_errors_m(bus: Bus, drive: Drive) -> np.ndarray:
@@ -168,6 +171,60 @@ def test_what_is_missing_is_said(bus: Bus, drive: Drive) -> None:
     drive_node(bus, [*drive.static(), *odometry, odometry[30], *list(drive.apriltags())[:20]])
     assert any("no camera_info" in one for one in bus.warnings)
     assert any("BSLAM_E_TIME" in one for one in bus.warnings)
+
+
+def test_labels_are_of_whole_identities_and_none_is_none(bus: Bus, drive: Drive) -> None:
+    """The tags of two families with one number are two beacons; those that nobody knows are not beacon 0."""
+
+    def change(message: Any) -> None:
+        for one in message.detections:
+            hypothesis = one.results[0].hypothesis
+            number = int(hypothesis.class_id)
+            hypothesis.class_id = ("exit", "a:1", "b:1", "-1", "", "1")[number]
+
+    names = {"detections": "/detections", "detections_type": "vision_msgs/msg/Detection3DArray"}
+    node = drive_node(
+        bus, parts(drive.static(), drive.odometry(), changed(drive.detections_3d(), change)), **names
+    )
+    assert sorted(node.words) == ["1", "a:1", "b:1", "exit"]
+    assert sorted(node.words.values()) == [0, 1, 2, 3]
+    assert {one.label for one in node.slam.beacons()} == {0, 1, 2, 3}
+
+
+def changed(said: Iterable[Said], change: Callable[[Any], None]) -> list[Said]:
+    listed = list(said)
+    for one in listed:
+        change(one[3])
+    return listed
+
+
+def test_what_is_broken_is_said_and_left_out(bus: Bus, drive: Drive) -> None:
+    odometry, aruco = list(drive.odometry())[:60], list(drive.aruco())[:10]
+    aruco[0][3].poses.pop()
+    for one in (odometry[0], odometry[20]):
+        one[3].pose.pose.orientation.z = math.nan
+    names = {"detections": "/aruco_markers", "detections_type": "ros2_aruco_interfaces/msg/ArucoMarkers"}
+    drive_node(bus, [*drive.static(), *odometry, *aruco], **names)
+    assert sum("marker_ids and" in one for one in bus.warnings) == 1
+    assert sum("its pose is not finite" in one for one in bus.warnings) == 2
+    assert len(bus.published["~/pose"]) == 58
+
+
+def test_odometry_of_another_frame_is_that_of_the_base(bus: Bus, drive: Drive) -> None:
+    """Of the mast, ahead of base_link and to its left: the base is where base_link is."""
+    odometry, mast = list(drive.odometry())[:60], Transform(np.eye(3), np.array([0.05, 0.0, 0.2]))
+    drive_node(bus, [*drive.static(), *odometry])
+    plain = [(one.pose.pose.position.x, one.pose.pose.position.y) for one in bus.published.pop("~/pose")]
+    for _, _, _, message in odometry:
+        at, turn = message.pose.pose.position, message.pose.pose.orientation
+        at.x, at.y, _ = pose_of_part((at.x, at.y, 2.0 * math.atan2(turn.z, turn.w)), mast)
+        message.child_frame_id = "mast"
+    drive_node(bus, [*drive.static(), *odometry])
+    places = [(one.pose.pose.position.x, one.pose.pose.position.y) for one in bus.published["~/pose"]]
+    np.testing.assert_allclose(places, plain, atol=1e-5)
+    assert bus.warnings == []
+    drive_node(bus, odometry)
+    assert "no way from mast, the odometry's frame, to base_link" in bus.warnings[0]
 
 
 def test_it_is_short() -> None:
