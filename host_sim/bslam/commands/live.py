@@ -129,8 +129,8 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _follow_in_rerun(arguments: argparse.Namespace) -> int:
     """The same run, followed by Rerun's viewer; it has no buttons for the run."""
-    stream = open_stream(arguments.rerun)
     show = _Show(_job(arguments), arguments.out.absolute(), arguments.speed)
+    stream = open_stream(arguments.rerun)  # last: a file of that name is emptied
     show.player.start()
     show.player.pace.play()
     try:

@@ -25,6 +25,7 @@ class Stream:
         Stream.made.append(self)
 
     def save(self, path: str) -> None:
+        Path(path).write_bytes(b"")  # as rerun-sdk does, at once
         self.saved = path
 
     def set_time(self, timeline: str, *, duration: float) -> None:
@@ -97,3 +98,11 @@ def test_what_cannot_be_followed_is_one_line(
     assert main(["live", "paper_room", "--rerun", target]) == 2
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1
+
+
+def test_a_run_that_cannot_be_leaves_the_file(tmp_path: Path, rerun: type[Stream]) -> None:
+    file = tmp_path / "keep.rrd"
+    file.write_text("mine")
+    assert main(["live", "paper_rom", "--rerun", str(file)]) == 2
+    assert main(["live", "csv", str(tmp_path), "--rerun", str(file)]) == 2
+    assert file.read_text() == "mine" and rerun.made == []
