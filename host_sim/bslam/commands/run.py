@@ -74,6 +74,9 @@ def _film_path(text: str) -> Path:
     if Path(text).suffix not in SUFFIXES:
         allowed = ", ".join(f"FILE{suffix}" for suffix in SUFFIXES)
         raise argparse.ArgumentTypeError(f"'{text}' is no picture that moves; allowed: {allowed}")
+    there = next(one for one in Path(text).absolute().parents if one.exists())
+    if Path(text).is_dir() or not there.is_dir():
+        raise argparse.ArgumentTypeError(f"'{text}' cannot be written; allowed: a file in a folder")
     return Path(text)
 
 

@@ -67,6 +67,18 @@ def test_film_of_another_kind_is_refused_before_anything_runs(
     assert not (tmp_path / "out").exists()
 
 
+def test_film_in_a_place_that_is_none_is_refused_before_anything_runs(
+    short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.gif").mkdir()
+    for place in ("file/x.gif", "file/deeper/x.gif", "folder.gif"):
+        with pytest.raises(SystemExit):
+            main(["run", str(short), "--film", str(tmp_path / place), "--out", str(tmp_path / "out")])
+        assert "cannot be written; allowed: a file in a folder" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_verdict_says_how_many_by_what_and_the_worst(
     short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
