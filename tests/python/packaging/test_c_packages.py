@@ -399,7 +399,7 @@ def test_page_names_what_there_is(packed: packages.Files) -> None:
 def repository(tmp_path: Path) -> Path:
     """A copy of what packages are made of, under git."""
     copy = tmp_path / "repository"
-    folders = (*packages.FOLDERS, "firmware/cmake", packages.ARDUINO)
+    folders = (*packages.FOLDERS, "firmware/cmake", packages.ARDUINO, "examples/arduino", "examples/esp_idf")
     files = "library.json idf_component.yml CMakeLists.txt Kconfig firmware/Kconfig LICENSE README.md "
     files += "pyproject.toml CHANGELOG.md"
     for name in places.tracked(ROOT, *folders, *files.split()):
