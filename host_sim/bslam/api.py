@@ -168,13 +168,12 @@ def _perhaps_a_setting(word: str) -> str:
 def plot(run: Run) -> Figure:
     """Path and map with 2-sigma ellipses beside, where there is a truth, position error and NEES over time.
 
-    A matplotlib figure, which a notebook shows; `plot(run).savefig("run.png")` keeps it. Map and truth are
-    aligned as the path is; ellipses stand relative to the start, so that none is drawn after an alignment.
+    A matplotlib figure, which a notebook shows; `plot(run).savefig("run.png")` keeps it. The map is brought
+    to the truth as the path is; ellipses stand relative to the start.
     """
     if not isinstance(run, Run):
         raise BslamError(f"plot of {type(run).__name__}; allowed: a Run, as log.run() gives it")
-    log, trace = run.log, run.trace
-    errors = evaluate(log, trace, replace(run.options, map_align=None))
+    log, trace, errors = run.log, run.trace, run.errors
     has_errors = errors is not None and bool(np.isfinite(errors.error_m).any())
     figure = new_figure(15.0 if has_errors else 8.0, 7.5)
     grid = figure.add_gridspec(2, 2 if has_errors else 1)

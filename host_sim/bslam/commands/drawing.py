@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.evaluation.align import Rigid
 from bslam.evaluation.consistency import nees_band_95
 from bslam.evaluation.metrics import WINDOW_S, Evaluation
 from bslam.evaluation.trace import MapBeacon, Trace
@@ -48,23 +50,33 @@ def room(
     evaluation: Evaluation | None,
     walls_m: NDArray[np.float64],
 ) -> Room:
-    """What the picture of the map shows, in the frame of the truth; without one, in that of the map."""
+    """What the picture of the map shows, in the frame of the truth; without one, in that of the map.
+
+    Path and beacons are brought there by one transform, that of the path, so that they stand as they do in
+    the map: what the alignment leaves between a mapped beacon and the true one is seen.
+    """
+    to_truth = Rigid() if evaluation is None else evaluation.to_truth
+    starred = set() if log.beacons is None else set(log.beacons.beacon_id.tolist())
+    shown = Room(
+        title=name,
+        estimate_m=to_truth.points(trace.pose[:, :2]),
+        mapped=[_mapped(one, to_truth, log, starred) for one in trace.beacons],
+    )
     if evaluation is None:
-        mapped = [Mapped(one.x_m, one.y_m, one.covariance_m2, one.confirmed) for one in trace.beacons]
-        return Room(name, trace.pose[:, :2], mapped=mapped)
-    return Room(
-        title=name + _ALIGNED[evaluation.map_align],
-        estimate_m=evaluation.estimate[:, :2],
+        return shown
+    return replace(
+        shown,
+        title=name + _ALIGNED[evaluation.align],
         truth_m=evaluation.truth[:, :2] if log.truth is not None else None,
         beacons=log.beacons,
         identity=log.identity,
-        mapped=[_in_truth(beacon, evaluation) for beacon in trace.beacons],
         walls_m=walls_m,
     )
 
 
-def _in_truth(beacon: MapBeacon, evaluation: Evaluation) -> Mapped:
-    """A beacon in the frame of the truth; if aligned without ellipse, which is relative to the start."""
-    x_m, y_m = evaluation.map_to_truth.points(np.array([[beacon.x_m, beacon.y_m]]))[0]
-    covariance_m2 = beacon.covariance_m2 if evaluation.map_align == "none" else None
-    return Mapped(float(x_m), float(y_m), covariance_m2, beacon.confirmed)
+def _mapped(beacon: MapBeacon, to_truth: Rigid, log: Log, starred: set[int]) -> Mapped:
+    """A beacon as it is drawn; named where no star has its name already."""
+    x_m, y_m = to_truth.points(np.array([[beacon.x_m, beacon.y_m]]))[0]
+    is_named = beacon.true_id >= 0 and beacon.true_id not in starred
+    name = log.identity(beacon.true_id) if is_named else ""
+    return Mapped(float(x_m), float(y_m), to_truth.covariance(beacon.covariance_m2), beacon.confirmed, name)

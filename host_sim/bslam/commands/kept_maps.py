@@ -100,7 +100,7 @@ def _show(path: Path, out: Path) -> None:
         place = [f"{one.x_m:.2f}", f"{one.y_m:.2f}", f"{sd_m:.2f}"]
         words = [str(one.uid), label, one.kind, str(one.beacon_class or "-")]
         rows.append([*words, *place, scale, str(one.sightings), machine])
-        mapped.append(Mapped(one.x_m, one.y_m, seen.covariance, True))
+        mapped.append(Mapped(one.x_m, one.y_m, seen.covariance, True, "" if one.label < 0 else label))
     print(table_of(rows))
     room = Room(f"{path.name}: {len(kept.beacons)} beacons", np.zeros((1, 2)), mapped=mapped)
     picture = out / f"{path.stem}.png"

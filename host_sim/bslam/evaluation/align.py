@@ -32,6 +32,11 @@ class Rigid:
         """(n, 3) x_m, y_m, theta_rad -> (n, 3), theta in (-pi, pi]."""
         return np.column_stack([self.points(poses[:, :2]), wrap_angle(poses[:, 2] + self.turn_rad)])
 
+    def covariance(self, covariance_m2: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of a point, (2, 2) -> (2, 2)."""
+        turned: NDArray[np.float64] = self.rotation @ covariance_m2 @ self.rotation.T
+        return turned
+
     def inverse(self) -> Rigid:
         """The transform that undoes this one."""
         back = Rigid(-self.turn_rad).points(np.array([[self.shift_x_m, self.shift_y_m]]))[0]
@@ -47,6 +52,10 @@ class Similarity(Rigid):
     def points(self, points_m: Points) -> Points:
         """(n, 2) -> (n, 2)."""
         return super().points(points_m * self.scale)
+
+    def covariance(self, covariance_m2: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of a point, (2, 2) -> (2, 2)."""
+        return self.scale**2 * super().covariance(covariance_m2)
 
     def inverse(self) -> Similarity:
         """The transform that undoes this one."""

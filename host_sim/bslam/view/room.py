@@ -31,6 +31,7 @@ class Mapped:
     y_m: float
     covariance_m2: NDArray[np.float64] | None  # (2, 2); None: no ellipse
     confirmed: bool
+    name: str = ""  # beside the cross; "": nobody knows one
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,13 @@ def _draw_beacons(axes: Any, beacons: Beacons, name: Callable[[int], str]) -> No
     }
     axes.plot(beacons.x_m, beacons.y_m, color=BEACON, label="true beacon", zorder=5, **style)
     for identity, x_m, y_m in zip(beacons.beacon_id.tolist(), beacons.x_m, beacons.y_m, strict=True):
-        style = {"xytext": (7, 6), "textcoords": "offset points", "fontsize": 8, "color": "#6b4b00"}
-        axes.annotate(name(identity), (x_m, y_m), parse_math=False, zorder=8, **style, path_effects=_HALO)
+        _write(axes, name(identity), x_m, y_m, "#6b4b00")
+
+
+def _write(axes: Any, name: str, x_m: float, y_m: float, colour: str) -> None:
+    """The name of what stands there."""
+    style: dict[str, Any] = {"xytext": (7, 6), "textcoords": "offset points", "fontsize": 8, "color": colour}
+    axes.annotate(name, (x_m, y_m), parse_math=False, zorder=8, **style, path_effects=_HALO)
 
 
 def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:
@@ -115,6 +121,8 @@ def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:
     style = {"marker": "+", "markersize": 11, "markeredgewidth": 1.5, "linestyle": "", "zorder": 6}
     axes.plot(xs, ys, color=SECOND, alpha=alpha, label=label, **style)
     for one in beacons:
+        if one.name:
+            _write(axes, one.name, one.x_m, one.y_m, SECOND)
         if one.covariance_m2 is not None:
             outline = {
                 "facecolor": "none",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bslam.evaluation.align import Rigid, fit_rigid, fit_scale, wrap_angle
+from bslam.evaluation.align import Rigid, Similarity, fit_rigid, fit_scale, wrap_angle
 
 ANGLES = st.floats(-math.pi, math.pi)
 METRES = st.floats(-100.0, 100.0)
@@ -76,3 +76,9 @@ def test_fit_scale_leaves_less_than_any_other_scale():
     assert scale == pytest.approx(1.3, abs=0.05)
     assert left(scale) < min(left(scale - 1e-3), left(scale + 1e-3))
     assert fit_scale(moving[:1], fixed[:1]) == fit_scale(moving[:0], fixed[:0]) == 1.0
+
+
+def test_covariance_is_that_of_the_points_that_were_moved():
+    points = np.random.default_rng(1).normal(0.0, (0.3, 0.1), (50, 2))
+    moved = Similarity(0.7, 2.0, -1.0, 1.5)
+    np.testing.assert_allclose(moved.covariance(np.cov(points.T)), np.cov(moved.points(points).T))

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from bslam.cli import main
+from bslam.commands.drawing import room
 from bslam.datasets.mrclam import load_mrclam
 from bslam.evaluation.align import Rigid, Similarity
 from bslam.log import Beacons, Odometry, Truth
+from bslam.view.room import draw_room
 
 REAL = {"wheel_noise": "actuation"}
 
@@ -81,6 +83,32 @@ def test_a_truth_in_a_frame_of_its_own_is_aligned_and_one_that_starts_at_the_rob
     asked, _ = replay(moved, "--align", "none")
     assert asked["align"] == "none" and asked["diverged"]
     assert asked["map_rmse_m"] > 1.0
+
+
+def test_the_picture_brings_path_and_beacons_to_the_truth_by_one_transform(drive):
+    away = elsewhere(drive, Rigid(2.0, 30.0, -7.0))
+    run = replace(away, beacons=None).run(association="known")
+    shown = room("away", run.log, run.trace, run.errors, np.empty((0, 4)))
+    assert shown.title == "away (rigidly aligned with the truth)"
+    assert np.abs(shown.estimate_m - shown.truth_m).max() < 0.2
+    true_m = {str(one): place for one, *place in zip(*vars(away.beacons).values(), strict=True)}
+    assert {one.name for one in shown.mapped} == set(true_m)
+    for one, beacon in zip(shown.mapped, run.trace.beacons, strict=True):
+        assert math.dist((one.x_m, one.y_m), true_m[one.name]) < 0.2
+        turn = run.errors.to_truth.rotation
+        np.testing.assert_allclose(one.covariance_m2, turn @ beacon.covariance_m2 @ turn.T)
+    labels = [text.get_text() for text in draw_room(shown).axes[0].texts]
+    assert sorted(labels) == sorted(true_m)
+
+
+def test_a_picture_that_is_not_aligned_does_not_say_so_and_names_each_beacon_once(drive):
+    run = drive.run(association="known")
+    assert run.errors.map_align == "rigid"  # that of map_rmse_m is no business of the picture
+    shown = room("here", run.log, run.trace, run.errors, np.empty((0, 4)))
+    assert shown.title == "here"
+    assert [(one.x_m, one.y_m) for one in shown.mapped] == [(one.x_m, one.y_m) for one in run.trace.beacons]
+    labels = [text.get_text() for text in draw_room(shown).axes[0].texts]
+    assert sorted(labels) == sorted(map(str, drive.beacons.beacon_id.tolist()))
 
 
 def test_a_truth_that_begins_later_than_the_drive_says_nothing_of_the_start(replay, drive):
