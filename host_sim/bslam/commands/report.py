@@ -32,7 +32,7 @@ _COLUMNS = (
 HEADINGS = [heading for heading, _ in _COLUMNS]
 _MOST_ROWS = 40
 _MOST_NOTES = 20
-_FAILED_NAMED = 3
+_NAMED = 3
 
 
 def finish(
@@ -62,19 +62,35 @@ def finish(
 
 
 def verdict(entries: Sequence[Mapping[str, Any]]) -> str:
-    """How many runs are right, by what the others failed, and the worst figure."""
+    """How many runs are right, by what the others failed, and the worst figure.
+
+    Right is what a truth was held against; and not where most of the log was left unused.
+    """
     failed = [one for one in entries if one.get("failed", one["diverged"])]
-    good = f"{len(entries) - len(failed)} of {len(entries)} right"
+    ran = [one for one in entries if not one.get("failed", one["diverged"])]
+    judged = [one for one in ran if "position_error_m" in one or "map_one_to_one" in one]
+    doubted = [one for one in ran if one.get("problems")]
+    right = [one for one in judged if not one.get("problems")]
+    none_told = bool(ran) and not judged
+    said = f"{len(ran) if none_told else len(right)} of {len(entries)} {'ran' if none_told else 'right'}"
     if failed:
         by = Counter(reason for one in failed for reason in one.get("failed_by", ["error"]))
-        names = ", ".join(str(one["name"]) for one in failed[:_FAILED_NAMED])
-        names += ", ..." if len(failed) > _FAILED_NAMED else ""
-        good += f", {len(failed)} FAILED by {', '.join(f'{one} ({by[one]})' for one in by)}: {names}"
+        said += f", {len(failed)} FAILED by {', '.join(f'{one} ({by[one]})' for one in by)}: {_names(failed)}"
+    if doubted:
+        said += f", {len(doubted)} in doubt: {_names(doubted)}"
+    if len(judged) < len(ran):
+        whose = "" if none_told else f" of {len(ran) - len(judged)}"
+        said += f"; no truth tells{whose} whether it is right"
     scored = [one for one in entries if "position_error_m" in one]
     if not scored:
-        return f"{good}; no truth says how large the error is" if not failed else good
+        return said
     worst = max(scored, key=lambda one: one["position_error_m"]["mean"])
-    return f"{good}; worst mean error {100.0 * worst['position_error_m']['mean']:.1f} cm, {worst['name']}"
+    return f"{said}; worst mean error {100.0 * worst['position_error_m']['mean']:.1f} cm, {worst['name']}"
+
+
+def _names(entries: Sequence[Mapping[str, Any]]) -> str:
+    names = ", ".join(str(one["name"]) for one in entries[:_NAMED])
+    return names + (", ..." if len(entries) > _NAMED else "")
 
 
 def _say_remarks(entries: Sequence[dict[str, Any]]) -> bool:

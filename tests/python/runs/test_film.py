@@ -99,3 +99,12 @@ def test_verdict_says_how_many_by_what_and_the_worst(
     assert verdict([good, bad, broken]) == (
         "1 of 3 right, 2 FAILED by map (1), nees (1), error (1): b, c; worst mean error 30.0 cm, b"
     )
+    untold = {"name": "d", "diverged": False, "failed": False}
+    assert verdict([untold]) == "1 of 1 ran; no truth tells whether it is right"
+    assert verdict([good, untold]).startswith("1 of 2 right; no truth tells of 1 whether it is right; worst")
+    assert verdict([untold, broken]) == (
+        "1 of 2 ran, 1 FAILED by error (1): c; no truth tells whether it is right"
+    )
+    unused = {"problems": ["most of the log was not used"]}
+    assert verdict([good | unused]) == "0 of 1 right, 1 in doubt: a; worst mean error 5.0 cm, a"
+    assert verdict([untold | unused]) == "1 of 1 ran, 1 in doubt: d; no truth tells whether it is right"
