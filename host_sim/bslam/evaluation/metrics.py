@@ -123,7 +123,8 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
             entry["map_one_to_one"] = _map_one_to_one(log, trace, evaluation)
     entry["failed_by"] = _failures(entry, evaluation)
     entry["failed"] = bool(entry["failed_by"])
-    return entry | {"notes": notes_on(log, trace, options), "problems": problems_of(log, trace, options)}
+    notes = notes_on(log, trace, options) + (_of_early_nees(trace, evaluation) if evaluation else [])
+    return entry | {"notes": notes, "problems": problems_of(log, trace, options)}
 
 
 def _failures(entry: dict[str, Any], evaluation: Evaluation | None) -> list[str]:
@@ -234,6 +235,30 @@ def _nees(
     result = np.full(len(rows), np.nan)
     result[rows] = nees(trace.pose[rows], truth[rows], trace.covariance[rows], options.filter)
     return result
+
+
+def _of_early_nees(trace: Trace, evaluation: Evaluation) -> list[str]:
+    """A note where NEES is of the alignment, and not of the filter.
+
+    At the start the estimate is exact by definition, so that what it is off there is the alignment's error.
+    While the filter is surer than that, NEES measures the alignment.
+    """
+    off_m = float(_distance(evaluation.estimate[:1], evaluation.truth[:1])[0])
+    if evaluation.align == "none" or not np.isfinite(off_m):
+        return []
+    position_sd_m = np.sqrt(trace.covariance[:, 0, 0] + trace.covariance[:, 1, 1])
+    early = np.logical_and.accumulate(position_sd_m < off_m)
+    known = np.isfinite(evaluation.nees)
+    if not (known & ~early).any():
+        return []
+    whole, later = float(evaluation.nees[known].mean()), float(evaluation.nees[known & ~early].mean())
+    if whole < POSE_95 or later > 0.5 * whole:
+        return []
+    until_s = float(evaluation.time_s[early][-1])
+    return [
+        f"NEES {whole:.1f} comes from the first {until_s:.1f} s, where the filter is surer than the "
+        f"alignment, {100.0 * off_m:.1f} cm off at the start; afterwards {later:.1f}"
+    ]
 
 
 def _path_m(log: Log, evaluation: Evaluation | None) -> float:
