@@ -30,6 +30,7 @@ from bslam.options import (
     RunOptions,
     parse_association,
 )
+from bslam.rig import load_rig
 from bslam.runs.camera import SCANNER_THRESHOLD, TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.runs.sources import CameraSource, Says, ScenarioSource, options_for
 from bslam.target.lines import TARGET_KINDS, no_such_target, qemu_machines
@@ -163,13 +164,17 @@ def scenario_source(
     arguments: argparse.Namespace, seed: int, sigma_mps: float | None, noise: str
 ) -> ScenarioSource:
     """The simulated drive that the options ask for."""
+    if arguments.rig is not None:
+        load_rig(arguments.rig)
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if _is_told(arguments.association) else UNTOLD_THRESHOLD
         threshold = threshold if arguments.model is None else SCANNER_THRESHOLD
         seen = (_rig(arguments), CAMERA_STORE, threshold, arguments.model)
         return CameraSource(arguments.scenario, seed, sigma_mps, noise, *seen)
-    if arguments.model is not None:
-        raise BslamError(f"--model {arguments.model}: cameras look by it; allowed: with --sensor camera")
+    for option in ("rig", "model"):
+        value = getattr(arguments, option)
+        if value is not None:
+            raise BslamError(f"--{option} {value}: cameras look by it; allowed: with --sensor camera")
     return ScenarioSource(arguments.scenario, seed, sigma_mps, noise)
 
 
