@@ -172,18 +172,19 @@ static bslam_status_t begin_members(bslam_instance_t *robot)
     robot->doubts.count = 0;
     bslam_slam_attach_doubts(&robot->slam, &robot->doubts);
 #endif
+    (void)robot;
     return status;
 }
 
 bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t sizes_hash,
                                 const bslam_settings_t *settings, int *bad_setting)
 {
+    *bad_setting = -1;
     if (robot_bytes != sizeof *robot || sizes_hash != BSLAM_SIZES_HASH) {
         return BSLAM_E_SIZE;
     }
-    const int more = asks_for_more(settings);
-    if (more >= 0) {
-        *bad_setting = more;
+    *bad_setting = asks_for_more(settings);
+    if (*bad_setting >= 0) {
         return BSLAM_E_PARAMETER;
     }
     if (settings->seed_count < 0 || settings->seed_count > BSLAM_SEEDS_MAX ||

@@ -49,9 +49,9 @@ typedef union bslam {
 // ---- beginning --------------------------------------------------------------------------------------------
 
 /// Robot at the origin, empty map. The settings are copied. BSLAM_E_PARAMETER: *bad_setting is the first
-/// setting outside its range, or that contradicts another (bslam_settings_info). BSLAM_E_SIZE: library and
-/// application were compiled with other sizes (config.h); nothing was written then. BSLAM_E_COUNT: more seeds
-/// than BSLAM_SEEDS_MAX. O(memory).
+/// setting outside its range, or that contradicts another (bslam_settings_info); else it becomes -1.
+/// BSLAM_E_SIZE: library and application were compiled with other sizes (config.h); *robot is not written
+/// then. BSLAM_E_COUNT: more seeds than BSLAM_SEEDS_MAX. O(memory).
 #define bslam_init(robot, settings, bad_setting) \
     bslam_init_sized((robot), sizeof *(robot), BSLAM_SIZES_HASH, (settings), (bad_setting))
 #if BSLAM_REAL_DOUBLE

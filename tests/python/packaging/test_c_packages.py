@@ -326,7 +326,16 @@ def test_amalgamation_gives_the_same_bits(two_files: Path, tmp_path: Path, real:
     "command",
     [
         ("clang-19", "-std=c11", "-Wall", "-Wextra", "-Werror", "-DBSLAM_SMOOTHER=1"),
-        ("arm-none-eabi-gcc", "-std=c11", "-mcpu=cortex-m4", "-DBSLAM_RECOVERY=0", "-DBSLAM_GUARD=0"),
+        (
+            "arm-none-eabi-gcc",
+            "-std=c11",
+            "-mcpu=cortex-m4",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-DBSLAM_RECOVERY=0",
+            "-DBSLAM_GUARD=0",
+        ),
     ],
 )
 def test_amalgamation_compiles_elsewhere(two_files: Path, command: Sequence[str]) -> None:

@@ -97,7 +97,7 @@ static void test_init_of_another_size_is_refused_and_writes_nothing(void **state
                      BSLAM_E_SIZE);
     assert_int_equal(bslam_init_sized(&robot, sizeof robot, BSLAM_SIZES_HASH + 1u, &settings, &bad_setting),
                      BSLAM_E_SIZE);
-    assert_int_equal(bad_setting, -7);
+    assert_int_equal(bad_setting, -1);
     assert_untouched();
 }
 
@@ -123,6 +123,7 @@ static void test_init_refuses_seeds_that_cannot_be(void **state)
     assert_int_equal(bslam_init(&robot, &settings, &bad_setting), BSLAM_E_COUNT);
     settings.seed_count = -1;
     assert_int_equal(bslam_init(&robot, &settings, &bad_setting), BSLAM_E_COUNT);
+    assert_int_equal(bad_setting, -1);
     assert_untouched();
     settings.seed_count = 1;
     assert_int_equal(bslam_init(&robot, &settings, &bad_setting), BSLAM_OK);
