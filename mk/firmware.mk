@@ -4,17 +4,13 @@
 
 TARGET ?= m4f
 SIZES :=
+BEACONS ?= 6 20 50
 
 ARM := arm-none-eabi-
 RISCV := riscv64-unknown-elf-
-TARGET_FLAGS_m0plus := -mcpu=cortex-m0plus
-TARGET_FLAGS_m4f := -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard
+include firmware/cmake/cores.mk
 # With all that is left out by itself: for the symbols, the stack and the sizes of all code.
 TARGET_FLAGS_m4f_whole := $(TARGET_FLAGS_m4f) -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2
-TARGET_FLAGS_m7 := -mcpu=cortex-m7 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
-TARGET_FLAGS_m33 := -mcpu=cortex-m33 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
-# Without its vector extension (MVE), whose floating point flushes denormals to zero: other bits.
-TARGET_FLAGS_m55 := -mcpu=cortex-m55+nomve -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 # Single precision in hardware, as on ESP32-P4, CH32V307 or GD32VF; with a library of its own, since Debian's
 # compiler comes without.
 TARGET_FLAGS_rv32 := -march=rv32imafc -mabi=ilp32f
@@ -74,7 +70,8 @@ $$(CORE_ARCHIVES_$(1)): build/$(1)/lib%.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
 	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$(filter $$(LIBRARY_SOURCES_$$*:%.c=build/$(1)/%.o),$$^)
 
-$$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk
+$$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk \
+    firmware/cmake/cores.mk
 	@mkdir -p $$(@D)
 	@$$(CORE_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
@@ -88,6 +85,6 @@ firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the imag
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons and what it has
-	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 \
+	@$(PYTHON) -m tools.checks.sizes --beacons $(BEACONS) \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm

@@ -40,7 +40,7 @@ BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(ROBOT_SOURCES) $(BOARD_SOU
     $(call sources_for,$(sort $(foreach library,$(or $(BOARD_LIBRARIES_$(1)),$(LIBRARIES)), \
     $(LIBRARY_SOURCES_$(library)))),$(BOARD_FLAGS_$(1))))
 BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
-BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
+BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/cmake/cores.mk firmware/port/$(1)/board.mk
 
 build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@mkdir -p $$(@D)

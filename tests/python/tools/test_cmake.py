@@ -22,12 +22,12 @@ def cmake(*words):
     return done.stdout
 
 
-def test_a_program_links_the_library(tmp_path):
+def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path):
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES C)\n"
+        "set(BSLAM_SIZES BSLAM_BEACONS_MAX=7 BSLAM_RAYS_MAX=0)\n"
         f"add_subdirectory({FIRMWARE} bslam)\nadd_executable(user main.c)\n"
         "target_link_libraries(user PRIVATE bslam::bslam)\n"
-        "target_compile_definitions(bslam PUBLIC BSLAM_BEACONS_MAX=7)\n"
     )
     (tmp_path / "main.c").write_text(
         '#include "bslam/bslam.h"\nstatic bslam_t robot;\nint main(void)\n{\n'
@@ -37,7 +37,7 @@ def test_a_program_links_the_library(tmp_path):
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
     cmake("-S", tmp_path, "-B", tmp_path / "build")
-    cmake("--build", tmp_path / "build", "--target", "user")
+    cmake("--build", tmp_path / "build")
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
 
 
@@ -85,20 +85,14 @@ def test_the_toolchain_file_builds_cpp_for_the_same_core(tmp_path):
     assert "Tag_ABI_VFP_args: VFP registers" in shown
 
 
-def test_a_core_that_does_not_exist_is_refused(tmp_path):
-    toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
-    words = [
-        "cmake",
-        "-S",
-        FIRMWARE,
-        "-B",
-        tmp_path,
-        f"-DCMAKE_TOOLCHAIN_FILE={toolchain}",
-        "-DBSLAM_CORE=z80",
-    ]
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
-    assert done.returncode != 0
-    assert "allowed: m0plus, m4f, m7, m33" in done.stderr
+def test_a_core_that_does_not_exist_is_refused_also_where_the_folder_stands_alone(tmp_path):
+    alone = shutil.copytree(FIRMWARE / "cmake", tmp_path / "firmware" / "cmake")
+    (tmp_path / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.16)\nproject(user C)\n")
+    words = ["-S", tmp_path, f"-DCMAKE_TOOLCHAIN_FILE={alone / 'cortex-m.cmake'}"]
+    assert "z80; allowed: m0plus, m4f, m7, m33, m55" in refused(
+        *words, "-B", tmp_path / "z", "-DBSLAM_CORE=z80"
+    )
+    cmake(*words, "-B", tmp_path / "m55", "-DBSLAM_CORE=m55")
 
 
 # ---- sizes and flags ---------------------------------------------------------------------------------------
@@ -147,7 +141,8 @@ def test_fetch_content_takes_the_folder(tmp_path):
         "    return bslam_crc16_add(0, 0x31) == 0x2672 ? 0 : 1;\n}\n"
     )
     cmake("-S", tmp_path, "-B", tmp_path / "build")
-    cmake("--build", tmp_path / "build", "--target", "user")
+    cmake("--build", tmp_path / "build")
+    assert [path.name for path in tmp_path.rglob("*.a")] == ["libbslam_link.a"]  # only what is linked
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
     cmake("--install", tmp_path / "build", "--prefix", tmp_path / "installed")
     assert not (tmp_path / "installed").exists()  # only what the user installs
