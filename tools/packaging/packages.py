@@ -66,7 +66,7 @@ def arduino(root: Path) -> Files:
 
 
 def platformio(root: Path) -> Files:
-    return read(root, "library.json", "LICENSE", "README.md", *FOLDERS)
+    return read(root, "library.json", "LICENSE", "README.md", f"{ARDUINO}/src", *FOLDERS)
 
 
 def esp_idf(root: Path) -> Files:

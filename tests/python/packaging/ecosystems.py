@@ -111,7 +111,8 @@ def platformio(archive: Path, work: Path) -> str:
         f"[env:here]\nplatform = native\nlib_deps = file://{archive}\nbuild_flags = -DBSLAM_BEACONS_MAX=7\n",
         encoding="utf-8",
     )
-    shutil.copy(ROOT / "tests/sketches/estimator.cpp", project / "src/main.cpp")
+    sketch = (ROOT / "tests/sketches/estimator.cpp").read_text(encoding="utf-8")
+    (project / "src/main.cpp").write_text(f"#include <bslam.h>\n{sketch}", encoding="utf-8")
     run(*pio, "run", folder=project, **words)
     built = project / ".pio/build/here"
     said = run(built / "program", folder=project)

@@ -55,6 +55,14 @@ def objects_of(sources: Sequence[Path], folder: Path, *compiler: object) -> list
     return objects
 
 
+def check_sketch(sketch: Path, *includes: str) -> None:
+    """A sketch compiles that includes all headers as Arduino's sketches do."""
+    text = "".join(f"#include <{header}>\n" for header in ("bslam.h", "bslam_vision.h", "bslam_link.h"))
+    sketch.write_text(text + (SKETCHES / "estimator.cpp").read_text(encoding="utf-8"), encoding="utf-8")
+    flags = ("-mcpu=cortex-m4", "-mthumb", "-std=gnu++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
+    run("arm-none-eabi-g++", *flags, *includes, sketch)
+
+
 def symbols(archive: Path, nm: str = "nm") -> set[str]:
     """Functions and data that others may use."""
     lines = run(nm, "--defined-only", "--extern-only", archive).splitlines()
@@ -98,13 +106,7 @@ def test_arduino_compiles_all_below_src_and_loses_nothing(arduino: Path, tmp_pat
 def test_arduino_sketch_compiles_as_cxx_by_the_headers_that_arduino_finds(
     arduino: Path, tmp_path: Path
 ) -> None:
-    text = (SKETCHES / "estimator.cpp").read_text(encoding="utf-8")
-    for header in ("bslam.h", "bslam_vision.h", "bslam_link.h"):
-        assert (arduino / "src" / header).is_file()
-        text = f"#include <{header}>\n{text}"
-    (tmp_path / "sketch.cpp").write_text(text, encoding="utf-8")
-    flags = ("-mcpu=cortex-m4", "-mthumb", "-std=gnu++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
-    run("arm-none-eabi-g++", *flags, f"-I{arduino / 'src'}", tmp_path / "sketch.cpp")
+    check_sketch(tmp_path / "sketch.cpp", f"-I{arduino / 'src'}")
 
 
 def test_arduino_sketches_include_what_arduino_finds(arduino: Path) -> None:
@@ -143,10 +145,17 @@ def test_platformio_manifest_names_what_the_package_holds(platformio: Path) -> N
     folders = [word[2:-2] for word in build["srcFilter"] if word.startswith("+<")]
     sources = [path for name in folders for path in (platformio / build["srcDir"] / name).rglob("*.c")]
     assert len(sources) == len(SOURCES)
-    exported = {path.split("/")[-1] for path in manifest["export"]["include"]}
-    assert {
-        path.name for path in [*platformio.iterdir(), *(platformio / "firmware").iterdir()]
-    } == exported | {"firmware"}
+    files = [path.relative_to(platformio) for path in platformio.rglob("*") if path.is_file()]
+    exported = manifest["export"]["include"]
+    assert all((platformio / name).exists() for name in exported)
+    assert all(any(file.is_relative_to(name) for name in exported) for file in files)
+
+
+def test_platformio_finds_the_headers_that_a_sketch_includes(platformio: Path, tmp_path: Path) -> None:
+    build = json.loads((platformio / "library.json").read_text(encoding="utf-8"))["build"]
+    flags = [flag[2:].strip() for flag in build["flags"] if flag.startswith("-I")]
+    includes = [f"-I{platformio / name}" for name in (build["includeDir"], build["srcDir"], *flags)]
+    check_sketch(tmp_path / "sketch.cpp", *includes)
 
 
 # ---- ESP-IDF and Zephyr: their functions, as far as they are called ----------------------------------------
