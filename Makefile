@@ -9,6 +9,8 @@ MAKEFLAGS += --no-builtin-rules
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
+# For what needs no installed package: before `make setup`, the system's.
+PLAIN_PYTHON := $(or $(wildcard $(PYTHON)),python3)
 BSLAM := $(VENV)/bin/bslam
 
 include mk/config.mk

@@ -62,7 +62,7 @@ CORE_ARCHIVES_$(1) := $(LIBRARIES:%=build/$(1)/lib%.a)
 
 .PHONY: library-$(1)
 library-$(1): $$(CORE_ARCHIVES_$(1))
-	@$$(PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$^
+	@$$(PLAIN_PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$^
 	@for archive in $$^; do $(call TOOLS_FOR,$(1))size --totals $$$$archive | \
 	    awk "END { printf \"$$$$archive: %d bytes of code and constants\\n\", \$$$$1 }"; done
 
@@ -85,6 +85,6 @@ firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the imag
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons and what it has
-	@$(PYTHON) -m tools.checks.sizes --beacons $(BEACONS) \
-	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
-	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm
+	@$(PLAIN_PYTHON) -m tools.checks.sizes --beacons $(BEACONS) \
+	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES) $(SIZES)" nm \
+	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f) $(SIZES)" $(ARM)nm

@@ -53,7 +53,8 @@ $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)
     firmware/port/sections.ld tools/checks/check_image.py
 	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
 	    -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
-	@$$(PYTHON) -m tools.checks.check_image $$@ --objects build/$(1) --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
+	@$$(PLAIN_PYTHON) -m tools.checks.check_image $$@ --objects build/$(1) \
+	    --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
 
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)

@@ -1,14 +1,11 @@
 # The C library for other people's package tools: archives, and the estimator as two files. docs/PACKAGES.md.
 
-# They need nothing that `make setup` installs.
-PACKAGING := $(if $(wildcard $(PYTHON)),$(PYTHON),python3)
-
 .PHONY: amalgamation packages
 amalgamation: ## the estimator as bslam.h and bslam.c; out/amalgamation
-	@$(PACKAGING) -m tools.packaging.amalgamate
+	@$(PLAIN_PYTHON) -m tools.packaging.amalgamate
 
 packages: ## archives for Arduino, PlatformIO, ESP-IDF, and the amalgamation; out/packages
-	@$(PACKAGING) -m tools.packaging.packages
+	@$(PLAIN_PYTHON) -m tools.packaging.packages
 
 # The tools of the ecosystems, in an environment of their own: they pin much that `bslam` needs otherwise.
 ECOSYSTEM_TOOLS := esp-idf-kconfig==3.14.0 idf-component-manager==3.1.2 packaging==26.3 platformio==6.2.0 \

@@ -26,4 +26,4 @@ build/playground/bslam.wasm: $(PLAYGROUND_C) $(CORE_HEADERS) $(wildcard playgrou
 	@$(PLAYGROUND_COMPILE) -Wl,--no-entry,--strip-all,--gc-sections,-z,stack-size=65536 $(PLAYGROUND_C) -o $@
 
 out/playground/index.html: build/playground/bslam.wasm playground/inline.py $(PLAYGROUND_PAGE)
-	@$(or $(wildcard $(PYTHON)),python3) playground/inline.py $< $@
+	@$(PLAIN_PYTHON) playground/inline.py $< $@

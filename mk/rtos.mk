@@ -38,6 +38,6 @@ $(RTOS_DIR)/%.o: $(RTOS_PORT)/%.c
 $(RTOS_IMAGE): $(RTOS_OBJECTS) $(BOARD_OBJECTS_$(RTOS_BOARD))
 	@$(BOARD_CC_$(RTOS_BOARD)) $(IMAGE_LINK) $(call LIBC_FOR,m4f) \
 	    -T firmware/port/$(RTOS_BOARD)/memory.ld $^ -lm -o $@
-	@$(PYTHON) -m tools.checks.check_image $@ --objects build/$(RTOS_BOARD)
+	@$(PLAIN_PYTHON) -m tools.checks.check_image $@ --objects build/$(RTOS_BOARD)
 
 -include $(RTOS_OBJECTS:.o=.d)

@@ -238,8 +238,9 @@ switches: odometry, sightings with and without distance, pose, covariance, map (
 {table(("linked", "bytes"), linked_rows())}
 ## RAM
 
-Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. `make sizes` \
-prints them for the host, too.
+Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. \
+`make sizes BEACONS="12" SIZES=-DBSLAM_RAYS_MAX=0` prints others, and those of the host. In C, `BSLAM_BYTES` \
+is `sizeof(bslam_t)`, known when it is compiled.
 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images

@@ -41,3 +41,17 @@ def test_firmware_unknown_target_names_the_allowed_ones() -> None:
 def test_package_forgets_what_was_built_before() -> None:
     *_, forget, build, _ = make("--dry-run", "package").stdout.splitlines()
     assert forget.startswith("rm -rf build/lib* build/bdist*") and "bdist_wheel" in build
+
+
+def test_sizes_are_of_the_beacons_asked_for_also_before_setup() -> None:
+    result = make("sizes", "BEACONS=1 12", "VENV=nowhere")
+    assert result.returncode == 0, result.stderr
+    rows = [line.split()[0] for line in result.stdout.splitlines() if line[:1] == " "]
+    assert rows == 4 * ["beacons", "1", "12"]
+
+
+@pytest.mark.parametrize("target", ["firmware", "examples", "packages", "amalgamation"])
+def test_what_needs_no_python_package_is_built_before_setup(target: str) -> None:
+    result = make("--dry-run", "--always-make", target, "VENV=nowhere")
+    assert result.returncode == 0 and "python3 -m tools." in result.stdout
+    assert "nowhere" not in result.stdout
