@@ -22,6 +22,7 @@ Files = dict[str, bytes]
 LIBRARIES = ("base", "bslam", "vision", "link")
 FOLDERS = tuple(f"firmware/{library}" for library in LIBRARIES)
 ARDUINO = "tools/packaging/arduino"
+SKETCHES = "examples/arduino"
 MOMENT = (1980, 1, 1, 0, 0, 0)  # of every file: the first that a zip can name
 
 
@@ -61,7 +62,7 @@ def arduino(root: Path) -> Files:
     """A library in Arduino's layout: sources below src, and there the headers that it looks for."""
     files = below(read(root, ARDUINO), f"{ARDUINO}/", "") | read(root, "LICENSE")
     files |= with_flat_names(below(read(root, *FOLDERS), "firmware", "src"))
-    files |= below(read(root, "examples/arduino"), "examples/arduino", "examples")
+    files |= below(read(root, f"{SKETCHES}/bslam_robot"), SKETCHES, "examples")
     return {f"bslam/{name}": text for name, text in files.items()}
 
 

@@ -121,6 +121,15 @@ def test_arduino_sketches_include_what_arduino_finds(arduino: Path) -> None:
         assert included and set(included) <= own, f"{sketch.name}: only headers at the top of src are found"
 
 
+def test_texts_of_the_arduino_archive_point_into_it(arduino: Path) -> None:
+    pages = [path.relative_to(arduino).as_posix() for path in arduino.rglob("*.md")]
+    assert pages == ["README.md"]
+    text = (arduino / "README.md").read_text(encoding="utf-8")
+    named = re.findall(r"src/[\w/.]+\.h|(?<=\]\()[^)]+", text)
+    assert {"src/bslam/bslam.h", "src/bslam/config.h"} <= set(named)
+    assert all((arduino / name).is_file() for name in named)
+
+
 def test_arduino_properties_have_what_the_library_manager_asks_for(arduino: Path) -> None:
     lines = (arduino / "library.properties").read_text(encoding="utf-8").splitlines()
     properties = dict(line.split("=", 1) for line in lines)
