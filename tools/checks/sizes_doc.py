@@ -239,8 +239,8 @@ switches: odometry, sightings with and without distance, pose, covariance, map (
 ## RAM
 
 Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. \
-`make sizes BEACONS="12" SIZES=-DBSLAM_RAYS_MAX=0` prints others, and those of the host. In C, `BSLAM_BYTES` \
-is `sizeof(bslam_t)`, known when it is compiled.
+`make sizes BEACONS="12" SIZES=-DBSLAM_RAYS_MAX=0` prints others, and the host's. In C it is \
+`BSLAM_BYTES`.
 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images
