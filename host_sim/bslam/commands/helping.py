@@ -37,7 +37,7 @@ class ShortHelp(argparse.RawDescriptionHelpFormatter):
         prefix: str | None = None,
     ) -> None:
         """The words that have to be there, and `[options]` for all others."""
-        words = [f"{one.metavar}..." if one.nargs == "+" else f"{one.metavar}" for one in _words(actions)]
+        words = [f"{_shown(one)}..." if one.nargs == "+" else _shown(one) for one in _words(actions)]
         super().add_usage(usage or " ".join(["%(prog)s", *words, "[options]"]), actions, groups, prefix)
 
     def start_section(self, heading: str | None) -> None:
@@ -104,3 +104,8 @@ def more_options(parser: argparse.ArgumentParser) -> Any:
 def _words(actions: Iterable[argparse.Action]) -> list[argparse.Action]:
     """Those that are no options."""
     return [one for one in actions if not one.option_strings]
+
+
+def _shown(word: argparse.Action) -> str:
+    """As the usage has it: its name, or the words that it may be."""
+    return str(word.metavar) if word.metavar else f"{{{','.join(map(str, word.choices or [word.dest]))}}}"

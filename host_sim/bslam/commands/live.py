@@ -42,7 +42,6 @@ EXAMPLES = """examples:
   bslam live paper_room
   bslam live paper_room --seed 3 --observation direction --speed 4
   bslam live paper_room --sensor camera
-  bslam live pairs --association mahalanobis --paused
   bslam live out/run/paper_room_seed0.mcap
   bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
   bslam live paper_room --target qemu:mps2_an386

@@ -117,6 +117,7 @@ def test_every_command_has_help_with_an_example(name, capsys):
     text = capsys.readouterr().out
     assert "examples:" in text
     assert f"bslam {name}" in text.split("examples:")[1]
+    assert "None" not in text.splitlines()[0]
     assert len(text.splitlines()) <= 49
     assert max(map(len, text.splitlines())) <= 100
 
