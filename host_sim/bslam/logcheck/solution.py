@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -88,8 +89,11 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
         sharp = whole.step_sd * np.minimum(1.0, 2.0 * state.scale[[2, 2, 3]])
         problem, state, doubtful = _fitted(replace(whole, step_sd=sharp), state.parameters, _FAR_KNOWN_D2)
     delay_s = float(state.parameters[DELAY]) - drive.delay_s
-    delay = Estimate(delay_s, float(standard_errors(problem, state, _ALL)[DELAY]))
+    error_s = float(standard_errors(problem, state, _ALL)[DELAY])
     gain = _cost_at(problem, state, drive.delay_s) - _cost_at(problem, state, drive.delay_s + delay_s)
+    if gain > 0.0:  # by delay the likelihood is bumpy: its bend at a bump is more than that of the whole
+        error_s = max(error_s, abs(delay_s) / math.sqrt(2.0 * gain))
+    delay = Estimate(delay_s, error_s)
     # Between rows of odometry its noise is averaged, which a fit likes: whole rows for all else.
     rows = np.rint(delay_s / drive.row_s) if abs(delay_s) >= drive.row_s else 0.0
     state = fit(problem, _delayed(state, drive.delay_s + rows * drive.row_s), _TIMED, rounds=1)
