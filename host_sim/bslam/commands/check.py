@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from bslam.commands.arguments import core_parameters
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.datasets.datasets import find_directory
 from bslam.datasets.mrclam import ROBOTS
 from bslam.errors import BslamError
-from bslam.logcheck.check import check_folder, check_log
+from bslam.logcheck.check import Settings, check_folder, check_log
 from bslam.logcheck.finding import Finding, Report
 from bslam.logcheck.picture import draw_picture
 from bslam.recording.reader import SUFFIX
@@ -27,19 +28,25 @@ EXAMPLES = """examples:
   bslam check csv recordings/* --out out/check
   bslam check mrclam MRCLAM_Dataset6 --robot 3
   bslam check out/run/paper_room_seed0.mcap
+  bslam check my_drive --set sighting_delay_us=120000
 
 Tested without ground truth: mirrored bearings, swapped wheels, degrees for radians, millimetres for metres,
 delay of the sightings, scale of way and turn, noise against what is told, identities exchanged or missing,
 stamps. For each finding: what, how sure, and the option or the edit that mends it. A note is true, but usual.
 Logs are named as in `bslam replay`; a folder may be named alone. A DIR that is no path is looked for in the
 directory named by BSLAM_DATA, else in ../shared/data.
-Writes summary.json, and a picture of the evidence for a finding. Exit status 1: something was found."""
+Writes summary.json, and for most findings a picture of the evidence. Exit status 1: something was found."""
 
 _SIGNS = {"csv": "odometry.csv*", "mrclam": "Robot*_Odometry.dat*", "dlr": "map.circles*"}
 """A file by which a folder's format is told."""
 
-Check = tuple[str, Callable[[], Report]]
-"""A log's name, and what checks it."""
+_MENDS = ("forward_scale", "turn_scale", "sighting_delay_us")
+"""Settings that a finding may ask for."""
+_HOW_TO_MEND = """mends that begin with --: options of `bslam replay csv DIR`
+--set: of `bslam check`, too, to test again; for good: KEY = VALUE under [settings] of robot.toml"""
+
+Check = tuple[str, Callable[[Settings], Report]]
+"""A log's name, and what checks it with these settings."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,6 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", type=int, choices=range(1, ROBOTS + 1), help="mrclam: one robot (default: all)"
     )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help=f"test again with a mend, of {', '.join(_MENDS)}; may be repeated",
+    )
+    parser.set_defaults(params=None)
     parser.add_argument(
         "--out",
         type=Path,
@@ -62,13 +77,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     entries = []
+    settings = _settings(arguments)
     for name, check in list(_checks(arguments.logs, arguments.robot)):
-        report = check()
+        report = check(settings)
         entries.append(_entry(name, report, arguments.out))
         print(replace(report, name=name))
         write_json(arguments.out / "summary.json", {"schema": SCHEMA, "logs": entries})
+    mends = [one["mend"] for entry in entries for one in (*entry["findings"], *entry["notes"])]
+    if any(mend.startswith("--") for mend in mends):
+        print(_HOW_TO_MEND)
     print(f"files in {arguments.out}: summary.json" + (", NAME.N.png" if _pictures(entries) else ""))
     return 1 if any(entry["findings"] for entry in entries) else 0
+
+
+def _settings(arguments: argparse.Namespace) -> Settings:
+    """What --set asks for. Raises BslamError."""
+    chosen = core_parameters(arguments)
+    for key in chosen:
+        if key not in _MENDS:
+            raise BslamError(f"--set {key}: a check does not depend on it; allowed: {', '.join(_MENDS)}")
+    return tuple(chosen.items())
 
 
 def _checks(words: list[str], robot: int | None) -> Iterator[Check]:
@@ -98,14 +126,14 @@ def _folder(kind: str, directory: str, robot: int | None) -> Iterator[Check]:
     for source in log_sources(kind, [directory], robot):
         if kind == "csv":
             folder = find_directory(directory, COLLECTIONS[kind])
-            yield source.name, lambda folder=folder: check_folder(folder)  # type: ignore[misc]
+            yield source.name, lambda settings, folder=folder: check_folder(folder, settings)  # type: ignore[misc]
         else:
-            yield source.name, lambda source=source: check_log(source.load())  # type: ignore[misc]
+            yield source.name, lambda settings, source=source: check_log(source.load(), settings)  # type: ignore[misc]
 
 
 def _recording(word: str) -> Check:
     source = RecordingSource(Path(word))
-    return source.name, lambda: check_log(source.load())
+    return source.name, lambda settings: check_log(source.load(), settings)
 
 
 def _entry(name: str, report: Report, out: Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +18,9 @@ from bslam.logcheck.flow import Flow, best_flow
 from bslam.logcheck.solution import solve
 from bslam.logcheck.units import sign_findings, signs, unit_slip
 
+Settings = Iterable[tuple[str, int | float]]
+"""Of the core, as `Robot.settings`: forward_scale, turn_scale, sighting_delay_us."""
+
 _SLIPS_MAX: Final = 3
 _BLIND: Final = (
     "all else: it takes a robot that moves and beacons with identities, seen again within a second"
@@ -26,20 +30,23 @@ _STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons a
 _NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
 
 
-def check_folder(folder: Path) -> Report:
-    """A csv folder, its files first. Raises BslamError for what cannot be read even so."""
+def check_folder(folder: Path, settings: Settings = ()) -> Report:
+    """A csv folder, its files first; `settings` as for `check_log`. Raises BslamError for what cannot be read
+    even so.
+    """
     with TemporaryDirectory() as place:
         copy = Path(place) / folder.resolve().name
         found = check_files(folder, copy) if folder.is_dir() else []
         try:
-            report = check_log(Log.read(copy if found else folder))
+            report = check_log(Log.read(copy if found else folder), settings)
         except BslamError as error:
             raise BslamError(str(error).replace(str(copy), str(folder))) from error
     return replace(report, findings=[*found, *report.findings])
 
 
-def check_log(log: Log) -> Report:
-    """Every test that the log's content allows."""
+def check_log(log: Log, settings: Settings = ()) -> Report:
+    """Every test that the log's content allows; `settings` win over the log's own."""
+    log = replace(log, robot=replace(log.robot, settings=(*log.robot.settings, *settings)))
     findings, factors = [*verdict.missing(log), *verdict.outside(log)], Factors()
     if are_degrees(log.sightings.bearing_rad):
         findings.append(degrees_finding(log.sightings.bearing_rad, "sightings"))

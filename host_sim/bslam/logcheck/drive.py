@@ -78,6 +78,7 @@ class Drive:
     names: NDArray[np.int64]  # (b,) identities
     robot: Robot
     delay_s: float
+    scales: tuple[float, float]  # forward_scale and turn_scale, which `odometry` has already
     is_commanded: bool  # odometry says what the robot shall do, and not what its wheels did
 
     @property
@@ -126,9 +127,10 @@ def drive_of(log: Log, factors: Factors) -> Drive:
     range_m = factors.range * s.range_m[rows]
     bearing_rad = wrap_rad(factors.bearing * s.bearing_rad[rows] + log.robot.sensor_yaw_rad)
     seen = Seen(time_s[rows], label.astype(np.intp), bearing_rad, range_m, _told_sd(log, range_m, rows))
-    odometry = Odometry(times_s, factors.way * way_m, factors.turn * turn_rad)
-    is_commanded = log.odometry.kind == "velocity"
-    return Drive(odometry, seen, names, log.robot, 1e-6 * params["sighting_delay_us"], is_commanded)
+    scales = params["forward_scale"], params["turn_scale"]
+    odometry = Odometry(times_s, factors.way * scales[0] * way_m, factors.turn * scales[1] * turn_rad)
+    delay_s, is_commanded = 1e-6 * params["sighting_delay_us"], log.odometry.kind == "velocity"
+    return Drive(odometry, seen, names, log.robot, delay_s, scales, is_commanded)
 
 
 def _seconds(time_us: NDArray[np.int64]) -> Floats:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -30,7 +31,7 @@ _TURN_OFF, _TURN_OFF_COMMANDED = 0.045, 0.135
 _WHEEL_OFF: Final = 0.03
 _YAW_OFF_RAD: Final = 0.08
 _SIZE_OFF: Final = 0.05  # of the map
-_SIZE_UNKNOWN: Final = 0.03  # where no beacons.csv tells it
+_SIZE_UNKNOWN: Final = 0.03  # where neither beacons.csv nor truth.csv tells it
 _WORTH_A_NOTE: Final = 0.02
 _AGREE: Final = 0.15  # flow and fit; else the wheels' noise hides the scale
 _DELAY_S: Final = 0.08
@@ -107,8 +108,8 @@ def delay(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
 
 
 def scales(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
-    """Way and turn against the sightings; the map's size against beacons.csv."""
-    placed = next((one for one in solution.references if one.what == "beacons.csv"), None)
+    """Way and turn against the sightings; the size against beacons.csv, else against truth.csv."""
+    placed = next(iter(solution.references), None)
     unit = 1.0 if placed is None else _unit_of(placed.scale)
     size, by = (1.0, "the ranges alone") if placed is None else (placed.scale / unit, placed.what)
     usual = (_WAY_OFF_COMMANDED, _TURN_OFF_COMMANDED) if drive.is_commanded else (_WAY_OFF, _TURN_OFF)
@@ -116,21 +117,39 @@ def scales(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     if abs(way.value - flow.way) < _AGREE * abs(flow.way):
         limit = usual[0] + way.cover + (_SIZE_UNKNOWN if placed is None else 0.0)
         own = Estimate(size * way.value, way.error)
-        yield from _scale("forward_scale", "way", own, limit, by, _sums_picture(solution, 0, "way, m"))
+        picture = _sums_picture(solution, 0, "way, m")
+        for one in _scale("forward_scale", "way", own, drive.scales[0], limit, by, picture):
+            yield one if placed is not None else _or_distances(one, own.value)
     if abs(turn.value - flow.turn) < _AGREE * abs(flow.turn):
         nearer = min((turn.value, flow.turn), key=lambda one: abs(one - 1.0))
         own, picture = Estimate(nearer, turn.error), _sums_picture(solution, 1, "turn, rad")
-        yield from _scale("turn_scale", "turn", own, usual[1] + turn.cover, "bearings", picture)
+        limit = usual[1] + turn.cover
+        yield from _scale("turn_scale", "turn", own, drive.scales[1], limit, "bearings", picture)
     if placed is not None and abs(placed.scale - 1.0) > _SIZE_OFF:
-        factor = placed.scale if unit == 1.0 else unit
-        yield Finding(
-            "scale" if unit == 1.0 else "units",
-            f"beacons.csv is {placed.scale:.4g} times as large as the map that the ranges make",
-            f"by the places of {len(placed.names)} beacons",
-            f"multiply x_m and y_m of beacons.csv by {1.0 / factor:.4g}, or other lengths by {factor:.4g}",
-            {"scale": placed.scale},
-            _map_picture(placed),
-        )
+        yield _size(placed, unit)
+
+
+def _size(placed: Fitted, unit: float) -> Finding:
+    """A map or path of another size than the reference; a truth that is in the same unit is believed."""
+    file, scale, is_map = placed.what, placed.scale, len(placed.names) > 0
+    factor = scale if unit == 1.0 else unit
+    what = f"{file} is {scale:.4g} times as large as the {'map' if is_map else 'path'} that the ranges make"
+    sure = f"by the places of {len(placed.names)} beacons" if is_map else f"by {len(placed.reference)} poses"
+    mend = f"multiply x_m and y_m of {file} by {1.0 / factor:.4g}, or other lengths by {factor:.4g}"
+    if unit == 1.0 and not is_map:
+        side = "long" if scale < 1.0 else "short"
+        what, sure = f"distances of sightings are {100.0 * abs(1.0 / scale - 1.0):.1f} % too {side}", what
+        mend = f"multiply range_m of sightings.csv, or the sizes of the things seen, by {scale:.4g}"
+    kind = "scale" if unit == 1.0 else "units"
+    return Finding(kind, what, sure, mend, {"scale": scale}, _map_picture(placed))
+
+
+def _or_distances(one: Finding, way: float) -> Finding:
+    """The same where nothing tells whether odometry or the distances have the right size."""
+    side = "long" if way > 1.0 else "short"
+    what = f"{one.what}, or distances of sightings are {100.0 * abs(way - 1.0):.1f} % too {side}"
+    mend = f"{one.mend}; or multiply range_m of sightings.csv, or the sizes of the things, by {1.0 / way:.3f}"
+    return replace(one, what=what, sure=f"{one.sure}; no beacons.csv or truth.csv tells which", mend=mend)
 
 
 def _unit_of(scale: float) -> float:
@@ -156,16 +175,18 @@ def _sums_picture(solution: Solution, column: int, label: str) -> Picture:
 
 
 def _scale(
-    setting: str, what: str, one: Estimate, limit: float, by: str, picture: Picture
+    setting: str, what: str, one: Estimate, told: float, limit: float, by: str, picture: Picture
 ) -> Iterator[Finding]:
+    """told: the setting as it is, which odometry has already."""
     off, error = abs(1.0 / one.value - 1.0), abs(one.value - 1.0)
+    whole = Estimate(told * one.value, told * one.error)
     if error > max(_WORTH_A_NOTE, _SURE * one.error):
         yield Finding(
             "scale",
             f"odometry's {what} is {100.0 * off:.1f} % too {'long' if one.value < 1.0 else 'short'}",
-            f"{setting} {one.text} by {by}; {100.0 * limit:.1f} % are usual or covered by the told noise",
-            f"--set {setting}={one.value:.3f}",
-            {setting: one.value, "error": one.error, "limit": limit},
+            f"{setting} {whole.text} by {by}; {100.0 * limit:.1f} % are usual or covered by the told noise",
+            f"--set {setting}={whole.value:.3f}",
+            {setting: whole.value, "error": whole.error, "limit": limit},
             picture,
             is_note=error <= limit,
         )

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bslam.log import Beacons, Log, Odometry, Robot, Sightings, wrap_rad
+from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
 
 STEP_US = 40_000
 _FRAME_ROWS = 4  # of odometry, from frame to frame
@@ -26,8 +26,8 @@ ROBOT = Robot(
 )
 
 
-def made_up(seed: int = 0, seconds: float = 60.0, kind: str = "wheels") -> Log:
-    """A log as it should be, with beacons.csv; sightings at 6 Hz within the field of view, to 5 m."""
+def made_up(seed: int = 0, seconds: float = 60.0, kind: str = "wheels", has_truth: bool = False) -> Log:
+    """A log as it should be, with beacons.csv, or with truth.csv in its place; sightings at 6 Hz within the field of view, to 5 m."""
     random = np.random.default_rng(seed)
     count = round(seconds * 1e6 / STEP_US)
     time_us = STEP_US * np.arange(count + 1, dtype=np.int64)
@@ -49,8 +49,9 @@ def made_up(seed: int = 0, seconds: float = 60.0, kind: str = "wheels") -> Log:
     range_m = range_m + np.hypot(0.02, 0.02 * range_m) * random.standard_normal(len(rows))
     mappable = np.ones(len(rows), dtype=bool)
     sightings = Sightings(time_us[rows], label.astype(np.int64), bearing, range_m, mappable)
-    beacons = Beacons(np.arange(len(PLACES_M)), *PLACES_M.T)
-    return Log("made_up", _odometry(kind, time_us, told), sightings, None, beacons, _robot(kind))
+    beacons = None if has_truth else Beacons(np.arange(len(PLACES_M)), *PLACES_M.T)
+    truth = Truth(time_us, x, y, wrap_rad(theta)) if has_truth else None
+    return Log("made_up", _odometry(kind, time_us, told), sightings, truth, beacons, _robot(kind))
 
 
 def _odometry(kind: str, time_us, told) -> Odometry:

@@ -163,6 +163,34 @@ def test_check_ranges_off_by_a_tenth_are_told_from_a_long_way_by_the_beacons():
     assert one.what.startswith("beacons.csv is 0.9")
 
 
+def test_check_ranges_and_a_way_that_differ_are_blamed_on_one_only_where_something_tells():
+    log = made_up(has_truth=True)
+    long = with_sightings(log, range_m=1.25 * log.sightings.range_m)
+    one = the_one(replace(long, truth=None))
+    assert "odometry's way is" in one.what and "or distances of sightings are" in one.what
+    forward, distances = one.mend.split("; or multiply range_m of sightings.csv, ")
+    assert float(forward.removeprefix("--set forward_scale=")) == pytest.approx(1.25, rel=0.02)
+    assert float(distances.split()[-1]) == pytest.approx(0.8, rel=0.02)
+    one = the_one(long)
+    assert one.what.startswith("distances of sightings are 2") and one.what.endswith("% too long")
+    assert float(one.mend.split()[-1]) == pytest.approx(0.8, rel=0.03)
+    short = with_odometry(log, a=0.8 * log.odometry.a, b=0.8 * log.odometry.b)
+    short = with_robot(short, wheelbase_m=0.8 * log.robot.wheelbase_m)
+    assert float(the_one(short).mend.removeprefix("--set forward_scale=")) == pytest.approx(1.25, rel=0.02)
+
+
+def test_check_a_mend_is_tested_again():
+    log = made_up()
+    spoilt = with_robot(with_odometry(log, a=0.8 * log.odometry.a, b=0.8 * log.odometry.b), wheelbase_m=0.2)
+    mends = dict(one.mend.removeprefix("--set ").split("=") for one in found(spoilt)[0])
+    assert set(mends) == {"forward_scale", "turn_scale"}
+    settings = tuple((key, float(value)) for key, value in mends.items())
+    assert found(with_robot(spoilt, settings=settings))[0] == []
+    half = with_robot(spoilt, settings=(("forward_scale", 1.1), ("turn_scale", float(mends["turn_scale"]))))
+    assert the_one(half).mend[:-2] == f"--set forward_scale={mends['forward_scale']}"[:-2]
+    assert check_log(spoilt, settings).findings == []
+
+
 def test_check_noise_told_too_small_is_named_and_too_large_noted():
     log = made_up()
     kinds = {"bearing_sigma_rad": 0.02, "range_sigma_fraction": 0.02, "range_sigma_floor_m": 0.02}

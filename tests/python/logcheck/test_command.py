@@ -61,6 +61,25 @@ def test_check_a_finding_exits_1_with_a_picture_and_what_mends_it(folder, tmp_pa
     assert "bearings are mirrored" in said and "multiply bearing_rad of sightings.csv by -1" in said
 
 
+def test_check_says_how_a_mend_is_applied_and_tests_again_with_it(folder, tmp_path, capsys):
+    log = made_up(seconds=40.0)
+    with_sightings(log, time_us=log.sightings.time_us + 300_000).write(folder)
+    _, (entry,), _ = check(tmp_path, folder)
+    said = capsys.readouterr().out
+    assert "options of `bslam replay csv DIR`" in said and "under [settings] of robot.toml" in said
+    (found,) = entry["findings"]
+    assert check(tmp_path, folder, *found["mend"].split())[0] == 0
+    assert "replay" not in capsys.readouterr().out
+    robot = folder / "robot.toml"
+    robot.write_text(f"{robot.read_text()}\n[settings]\n{found['mend'].removeprefix('--set ')}\n")
+    assert check(tmp_path, folder)[0] == 0
+
+
+def test_check_a_setting_that_it_does_not_look_at_is_refused(folder, capsys):
+    assert main(["check", str(folder), "--set", "gate_d2=9"]) == 2
+    assert "allowed: forward_scale, turn_scale, sighting_delay_us" in capsys.readouterr().err
+
+
 def test_check_several_logs_in_one_go(folder, tmp_path):
     other = tmp_path / "other"
     made_up(1, seconds=40.0).write(other)
