@@ -16,9 +16,15 @@ def did_you_mean(word: object, allowed: Iterable[str]) -> str:
 
     "" where none is near. Case and "-" for "_" count as no difference.
     """
+    name = nearest(word, allowed)
+    return "" if name is None else f"; did you mean {name!r}?"
+
+
+def nearest(word: str, allowed: Iterable[str]) -> str | None:
+    """The allowed name that is most like `word`; None where none is near."""
     by_plain_name = {_plain(name): name for name in allowed}
-    nearest = get_close_matches(_plain(word), by_plain_name, n=1)
-    return f"; did you mean {by_plain_name[nearest[0]]!r}?" if nearest else ""
+    found = get_close_matches(_plain(word), by_plain_name, n=1)
+    return by_plain_name[found[0]] if found else None
 
 
 def _plain(name: object) -> str:

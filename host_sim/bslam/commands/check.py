@@ -11,7 +11,7 @@ from typing import Any
 
 from bslam.commands.arguments import core_parameters
 from bslam.commands.replay import COLLECTIONS, log_sources
-from bslam.datasets.datasets import find_directory
+from bslam.datasets.datasets import SIGNS, find_directory, line_to_type
 from bslam.datasets.mrclam import ROBOTS
 from bslam.errors import BslamError
 from bslam.logcheck.check import Settings, check_folder, check_log
@@ -37,8 +37,6 @@ Logs are named as in `bslam replay`; a folder may be named alone. A DIR that is 
 directory named by BSLAM_DATA, else in ../shared/data.
 Writes summary.json, and for most findings a picture of the evidence. Exit status 1: something was found."""
 
-_SIGNS = {"csv": "odometry.csv*", "mrclam": "Robot*_Odometry.dat*", "dlr": "map.circles*"}
-"""A file by which a folder's format is told."""
 
 _MENDS = ("forward_scale", "turn_scale", "sighting_delay_us")
 """Settings that a finding may ask for."""
@@ -114,12 +112,12 @@ def _checks(words: list[str], robot: int | None) -> Iterator[Check]:
 
 def _kind_of(word: str) -> str:
     """The format of a folder that is named alone."""
-    for kind, sign in _SIGNS.items():
+    for kind, sign in SIGNS.items():
         with contextlib.suppress(BslamError):
             if any(find_directory(word, COLLECTIONS[kind]).glob(sign)):
                 return kind
     allowed = f"csv DIR, mrclam DIR, dlr DIR, or a recording, FILE{SUFFIX}"
-    raise BslamError(f"'{word}': no log that is known; allowed: {allowed}")
+    raise BslamError(f"'{word}': no log that is known; allowed: {allowed}{line_to_type('check', word)}")
 
 
 def _folder(kind: str, directory: str, robot: int | None) -> Iterator[Check]:

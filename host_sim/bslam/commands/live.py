@@ -19,6 +19,7 @@ from bslam.commands.arguments import (
 from bslam.commands.drawing import draw
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
+from bslam.datasets.datasets import is_bag, line_to_type
 from bslam.errors import BslamError
 from bslam.log import Log
 from bslam.moment import FAILED
@@ -192,6 +193,9 @@ def _what(arguments: argparse.Namespace) -> tuple[Source, RunOptions]:
     if kind.endswith(SUFFIX):
         recording = RecordingSource(Path(kind))
         return recording, options_of(recording.recording(), arguments.target, core_parameters(arguments))
+    if Path(kind).is_dir() or is_bag(Path(kind)):
+        allowed = f"SCENARIO, FILE{SUFFIX}, or {{{','.join(COLLECTIONS)}}} DIR"
+        raise BslamError(f"'{kind}' is no scenario; allowed: {allowed}{line_to_type('live', kind)}")
     wheels = load_scenario(kind).wheels
     noise = arguments.noise or wheels.noise
     sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma

@@ -16,7 +16,7 @@ from bslam.commands.arguments import (
 )
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
-from bslam.datasets.datasets import find_directory
+from bslam.datasets.datasets import find_directory, is_bag, line_to_type
 from bslam.datasets.mrclam import ROBOTS, robots_in
 from bslam.errors import BslamError
 from bslam.recording.reader import SUFFIX
@@ -103,7 +103,8 @@ def jobs_of(arguments: argparse.Namespace, kind: str, directories: list[str]) ->
 def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:
     for path in paths:
         if not path.endswith(SUFFIX):
-            raise BslamError(f"'{path}': allowed: csv DIR, mrclam DIR, dlr DIR, or recordings, FILE{SUFFIX}")
+            allowed = f"csv DIR, mrclam DIR, dlr DIR, or recordings, FILE{SUFFIX}"
+            raise BslamError(f"'{path}': allowed: {allowed}{line_to_type('replay', path)}")
     for name, default in arguments.defaults.items():
         if getattr(arguments, name) != default:
             option = "--preset" if name == "presets" else f"--{name.replace('_', '-')}"
@@ -149,6 +150,10 @@ def log_sources(kind: str, directories: list[str], robot: int | None) -> list[So
         raise BslamError(f"--robot {robot}: a {kind} log is of one robot; allowed: --robot with mrclam")
     folders = [find_directory(name, COLLECTIONS[kind]) for name in directories]
     if kind == "csv":
+        for folder in filter(is_bag, folders):
+            raise BslamError(
+                f"{folder}: no odometry.csv; allowed: a log{line_to_type('replay', str(folder))}"
+            )
         return [FolderSource(folder) for folder in folders]
     if kind == "dlr":
         return [DlrSource(folder) for folder in folders]

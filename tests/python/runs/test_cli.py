@@ -111,6 +111,34 @@ def test_a_set_that_the_data_directory_does_not_have_is_named_with_those_it_has(
     assert line.endswith("MRCLAM_Dataset3")
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["replay", "my_drive"], "did you mean: bslam replay csv my_drive"),
+        (["replay", "my_driv"], "did you mean: bslam replay csv my_drive"),
+        (["replay", "csv", "my_driv"], "did you mean 'my_drive'?"),
+        (["live", "my_drive"], "did you mean: bslam live csv my_drive"),
+        (["check", "my_drvie"], "did you mean: bslam check csv my_drive"),
+        (["replay", "my_bag"], "did you mean: bslam import ros2 my_bag"),
+        (["check", "my_bag"], "did you mean: bslam import ros2 my_bag"),
+        (["live", "my_bag"], "did you mean: bslam import ros2 my_bag"),
+        (["replay", "my_bag/my_bag.db3"], "did you mean: bslam import ros2 my_bag/my_bag.db3"),
+        (["replay", "csv", "my_bag"], "my_bag"),
+        (["replay", "csv", "elsewhere/x"], "robot.toml"),
+    ],
+)
+def test_a_folder_that_is_said_otherwise_is_met_with_the_line_to_type(
+    words, said, tmp_path, monkeypatch, capsys
+):
+    for file in ("my_drive/odometry.csv", "my_bag/metadata.yaml", "my_bag/my_bag.db3"):
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).touch()
+    monkeypatch.chdir(tmp_path)
+    assert status_of(words) == 2
+    line = last_line(capsys)
+    assert line.endswith(said) and "allowed: " in line and "BSLAM_DATA" not in line
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help_with_an_example(name, capsys):
     assert status_of([name, "--help"]) == 0
