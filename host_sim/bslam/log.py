@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -640,7 +640,11 @@ def _beacons(table: Table, beacon_id: NDArray[np.int64]) -> Beacons:
 
 def _read_robot(path: Path) -> Robot:
     if not path.is_file():
-        raise BslamError(f"{path.parent}: robot.toml is missing; a log needs it (geometry and noise)")
+        needs = ", ".join(one.name for one in fields(Robot) if one.default is MISSING)
+        example = "docs/LOG-FORMAT.md, 'Your own robot's log', has one to copy"
+        raise BslamError(
+            f"{path.parent}: {path.name} is missing; allowed: lines of KEY = VALUE with {needs}; {example}"
+        )
     return _checked_robot(load_toml(path), str(path))
 
 
@@ -652,7 +656,7 @@ def _robot_of(robot: Robot | Mapping[str, Any] | str | Path) -> Robot:
     if isinstance(robot, Mapping):
         return _checked_robot(robot, "robot")
     if isinstance(robot, (str, Path)):
-        return _checked_robot(load_toml(Path(robot)), str(robot))
+        return _read_robot(Path(robot))
     raise BslamError(f"robot {robot!r}: allowed: a Robot, a mapping of its keys, the path of a robot.toml")
 
 

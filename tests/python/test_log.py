@@ -369,7 +369,7 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
         # what is missing or doubled
         ({"odometry_csv": None}, r"odometry\.csv is missing; a log needs odometry\.csv or odometry\.csv\.gz"),
         ({"sightings_csv": None}, r"sightings\.csv is missing"),
-        ({"robot_toml": None}, r"robot\.toml is missing"),
+        ({"robot_toml": None}, r"robot\.toml is missing; .* with wheelbase_m, .*; docs/LOG-FORMAT\.md"),
         # columns
         (
             {"odometry_csv": "time_us,left_m\n1,2\n"},

@@ -77,7 +77,10 @@ def check_files(folder: Path, copy: Path) -> list[Finding]:
     """Findings of the files; with any, `copy` holds the folder with these put right. Raises BslamError."""
     shutil.copytree(folder, copy)
     findings: list[Finding] = []
-    told = load_toml(folder / "robot.toml").get("step_us")
+    robot = folder / "robot.toml"
+    told = (
+        load_toml(robot).get("step_us") if robot.is_file() else None
+    )  # the strict reader says it is missing
     span_us = np.empty(0)  # of odometry
     for path in (copy / f"{stem}{suffix}" for stem in _STEMS for suffix in (".csv", ".csv.gz")):
         table = _read(path) if path.is_file() else None

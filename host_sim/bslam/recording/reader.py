@@ -47,8 +47,10 @@ def load(path: str | Path) -> Recording:
     except OSError as error:
         raise BslamError(f"{path}: cannot be read: {error}; {_ALLOWED}") from error
     if not entries or not isinstance(entries[0], Start):
-        cut = "it was cut short, and" if not complete else "it"
-        raise BslamError(f"{path}: {cut} does not begin with /start; {_ALLOWED}")
+        cut, bag = "it was cut short, and", ""
+        if complete:
+            cut, bag = "it", f"; for a bag of ROS 2: bslam import ros2 {path}"
+        raise BslamError(f"{path}: {cut} does not begin with /start; {_ALLOWED}{bag}")
     return Recording(path, entries[0], tuple(entries[1:]), complete)
 
 

@@ -147,7 +147,10 @@ def test_what_is_wrong_is_said_as_of_a_file(table, column, change, allowed, tmp_
             lambda o, s: Log.from_dataframe(o, s, robot=0.3),
             "robot 0.3: allowed: a Robot, a mapping of its",
         ),
-        (lambda o, s: Log.from_dataframe(o, s, robot="no.toml"), "no.toml: cannot be read"),
+        (
+            lambda o, s: Log.from_dataframe(o, s, robot="no.toml"),
+            "no.toml is missing; allowed: lines of KEY = VALUE",
+        ),
         (
             lambda o, s: Log.from_dataframe(o, s, robot=ROBOT | {1: 2}),
             "robot, key 1: no such key; allowed: w",

@@ -1,12 +1,19 @@
 """`bslam check` from outside, and what it says of files that the strict reader refuses."""
 
 import json
+import re
+from dataclasses import MISSING, fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bslam.cli import main
+from bslam.log import Log, Robot
 from logcheck.drives import made_up, with_sightings
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+STARRED = r"`(\w+)` \\\*"
 
 
 @pytest.fixture
@@ -102,6 +109,23 @@ def test_check_a_broken_file_exits_2_with_its_own_name(folder, tmp_path, capsys)
     edit(folder / "odometry.csv", lambda rows, _: [[rows[0][0], "x", rows[0][2]], *rows[1:]])
     assert main(["check", str(folder), "--out", str(tmp_path / "out")]) == 2
     assert f"{folder / 'odometry.csv'}, line 2" in capsys.readouterr().err
+
+
+def test_check_a_log_without_a_robot_says_what_that_holds_and_where_one_to_copy_is(folder, tmp_path, capsys):
+    robot = folder / "robot.toml"
+    text = (DOCS / "LOG-FORMAT.md").read_text(encoding="utf-8")
+    robot.unlink()
+    assert main(["check", str(folder), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert f"{folder}: robot.toml is missing; allowed: lines of KEY = VALUE with wheelbase_m, " in said
+    (example,) = re.findall(
+        r"^```toml\n(.*?)^```$", text.partition("## Your own robot's log")[2], re.M | re.S
+    )
+    required = {key for row in re.findall(r"^\| (`.*?) \|", text, re.M) for key in re.findall(STARRED, row)}
+    assert required == {one.name for one in fields(Robot) if one.default is MISSING}
+    assert all(key in said and key in example for key in required)
+    robot.write_text(example)
+    Log.read(folder)
 
 
 SLIPS = {
