@@ -26,13 +26,24 @@ ROBOT = Robot(
 )
 
 
-def made_up(seed: int = 0, seconds: float = 60.0, kind: str = "wheels", has_truth: bool = False) -> Log:
-    """A log as it should be, with beacons.csv, or with truth.csv in its place; sightings at 6 Hz within the field of view, to 5 m."""
+def made_up(
+    seed: int = 0,
+    seconds: float = 60.0,
+    kind: str = "wheels",
+    has_truth: bool = False,
+    turn_most_radps: float = 0.7,
+) -> Log:
+    """A log as it should be, with beacons.csv, or with truth.csv in its place; sightings at 6 Hz within the
+    field of view, to 5 m.
+    """
     random = np.random.default_rng(seed)
     count = round(seconds * 1e6 / STEP_US)
     time_us = STEP_US * np.arange(count + 1, dtype=np.int64)
     dt_s, middle_s = 1e-6 * STEP_US, 1e-6 * (time_us[1:] - STEP_US // 2)
-    speed_mps, turn_radps = 0.4 + 0.1 * np.sin(0.5 * middle_s), 0.7 * np.sin(0.35 * middle_s + 0.4)
+    speed_mps, turn_radps = (
+        0.4 + 0.1 * np.sin(0.5 * middle_s),
+        turn_most_radps * np.sin(0.35 * middle_s + 0.4),
+    )
     told = np.column_stack([speed_mps - turn_radps * BASE_M / 2, speed_mps + turn_radps * BASE_M / 2]) * dt_s
     driven = told + 0.02 * dt_s * random.standard_normal(told.shape)
     way, turn = driven.mean(axis=1), np.diff(driven, axis=1)[:, 0] / BASE_M

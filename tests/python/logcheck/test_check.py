@@ -130,6 +130,15 @@ def test_check_a_delay_is_named_with_the_setting_that_mends_it(delay_s):
         assert found(told)[0] == []
 
 
+def test_check_a_delay_that_a_drive_hardly_shows_is_as_unsure_as_it_is_wrong():
+    log = made_up(2, turn_most_radps=0.2)
+    late = with_sightings(log, time_us=log.sightings.time_us + 300_000)
+    one = the_one(late)
+    value_s, error_s = one.figures["delay_s"], one.figures["error"]
+    assert abs(value_s - 0.3) < 1.5 * error_s
+    assert error_s >= 0.99 * value_s / math.sqrt(2.0 * one.figures["log_likelihood_gain"])
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.1])
 def test_check_the_scale_of_the_way_is_named(factor):
     log = made_up()
