@@ -181,6 +181,13 @@ def standard_errors(problem: Problem, state: State, free: Free, told: bool = Fal
     return np.sqrt(np.maximum(np.diag(solver.corner)[-len(free) :], 0.0))
 
 
+def correlation(problem: Problem, state: State, free: Free, one: int, other: int) -> float:
+    """Of the estimates of two free parameters: near 1 or -1 the drive tells them only together."""
+    corner = _Linear(problem, state, free).solver(0.0).corner[-len(free) :, -len(free) :]
+    i, j = free.index(one), free.index(other)
+    return float(corner[i, j] / np.sqrt(corner[i, i] * corner[j, j]))
+
+
 def _to_beacons(problem: Problem, state: State) -> tuple[Floats, Floats]:
     """From the sensor to each beacon sighted: (m, 2) and its length (m,)."""
     sensor = state.poses[:, :2] + problem.mounts(state.poses)[0]

@@ -27,6 +27,7 @@ _BLIND: Final = (
 )
 _HANGING: Final = "all else: it takes sightings that change"
 _STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons are seen"
+_ONE_CURVATURE: Final = "one wheel against the other, scale of the turn: the drive has one curvature"
 _NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
 
 
@@ -71,7 +72,10 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
         *verdict.noise(solution),
         *verdict.identities(solution, log),
     ]
-    names = ("way", "turn", "bend", "yaw", "delay")
+    names = ["way", "turn", "bend", "yaw", "delay"]
+    if solution.has_one_curvature:
+        untested.append(_ONE_CURVATURE)
+        names = ["way", "yaw", "delay"]
     return Report(log.name, findings, untested, {name: vars(getattr(solution, name)) for name in names})
 
 

@@ -17,6 +17,7 @@ from bslam.logcheck.batch import (
     YAW,
     Problem,
     State,
+    correlation,
     cost,
     errors_at,
     fit,
@@ -37,6 +38,7 @@ _FAR_D2: Final = 25.0  # that makes a sighting doubtful
 _FAR_KNOWN_D2: Final = 9.0  # once odometry's noise is known
 _DOUBT: Final = 1e3  # by what the noise of a doubtful sighting counts as larger
 _BLOCK_S: Final = 5.0
+_COLLINEAR: Final = 0.95
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ class Solution:
     delay_gain: float  # log-likelihood by it
     noise: tuple[Noise, Noise]  # bearings, ranges
     references: list[Fitted]
+    has_one_curvature: bool  # on which turn and bend cannot be told apart
 
 
 def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
@@ -101,7 +104,8 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
     values = state.parameters[list(_TIMED)].tolist()
     way, turn, bend, yaw = (Estimate(*one) for one in zip(values, errors, covers, strict=True))
     noise, fitted = _noise(problem, state, ~doubtful), references(log, problem, state)
-    return Solution(whole, state, way, turn, bend, yaw, delay, gain, noise, fitted)
+    has_one_curvature = abs(correlation(problem, state, _TIMED, TURN, BEND)) > _COLLINEAR
+    return Solution(whole, state, way, turn, bend, yaw, delay, gain, noise, fitted, has_one_curvature)
 
 
 def _fitted(problem: Problem, parameters: Floats, far_d2: float) -> tuple[Problem, State, Bools]:

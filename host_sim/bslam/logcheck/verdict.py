@@ -196,7 +196,8 @@ def mount(solution: Solution, drive: Drive) -> Iterator[Finding]:
     """One wheel against the other, and the sensor's direction."""
     bend, yaw, base_m = solution.bend, solution.yaw, drive.robot.wheelbase_m
     wheel = bend.value * base_m
-    if abs(wheel) > max(_WHEEL_OFF + bend.cover * base_m, _SURE * bend.error * base_m):
+    limit = max(_WHEEL_OFF + bend.cover * base_m, _SURE * bend.error * base_m)
+    if limit < abs(wheel) < 1.0 and not solution.has_one_curvature:
         more, less = ("right", "left") if wheel < 0.0 else ("left", "right")
         yield Finding(
             "scale",

@@ -9,7 +9,7 @@ import pytest
 from bslam.log import first_steps
 from bslam.logcheck.check import check_log
 from bslam.world.simulate import load_scenario, simulate
-from logcheck.drives import exchanged, made_up, with_odometry, with_robot, with_sightings
+from logcheck.drives import arc, exchanged, made_up, with_odometry, with_robot, with_sightings
 
 
 def found(log):
@@ -261,3 +261,11 @@ def test_check_a_robot_at_rest_or_on_a_straight_says_what_it_cannot_test():
     assert findings == [] and len(report.untested) == 1
     straight = found(with_odometry(log, a=log.odometry.a, b=log.odometry.a))[1]
     assert any("hardly turns" in one for one in straight.untested)
+
+
+@pytest.mark.parametrize("seed", [8, 11])
+def test_check_an_arc_does_not_tell_a_wheel_from_the_scale_of_the_turn(seed):
+    findings, report = found(arc(seed))
+    assert findings == []
+    assert [one for one in report.untested if one.endswith("the drive has one curvature")]
+    assert not {"turn", "bend"} & set(report.estimates)
