@@ -176,9 +176,10 @@ def _outcome(bout: Bout, out: Path, steps: Any) -> Outcome:
         outcome = write_files(_judged(bout), out, log, trace)
         return replace(outcome, entry=_entry_of(bout, outcome.entry))
     except BslamError as error:
-        return _failure(bout, str(error))
+        return _failure(bout, " ".join([str(error), *getattr(error, "__notes__", ())]))
     except Exception as error:  # anything: it is a stranger's code
-        return _failure(bout, f"{type(error).__name__}: {error}", _without_our_frames())
+        said = " ".join([f"{type(error).__name__}: {error}", *getattr(error, "__notes__", ())])
+        return _failure(bout, said, _without_our_frames())
 
 
 def _judged(bout: Bout) -> Job:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -33,7 +34,8 @@ def run_algorithm(
 ) -> Trace:
     """Run it over the log; `alive` hears of every step that is done.
 
-    Raises what the algorithm raises, and AlgorithmError for a pose or map that is not finite.
+    Raises what the algorithm raises, with the step as a note, and AlgorithmError for a pose or map that is
+    not finite.
     """
     algorithm = make(setup_for(log, options))
     if getattr(algorithm, "needs_identity", False) and options.association != "known":
@@ -73,7 +75,20 @@ class _Drive:
         self._step_ns: list[int] = []
         self._times_us: list[int] = step_times_us(log).tolist()
         algorithm.reset(options.seed)
-        self._run(alive)
+        try:
+            self._run(alive)
+        except AlgorithmError:
+            raise
+        except Exception as error:  # anything: it is a stranger's code
+            error.add_note(self._where(error))
+            raise
+
+    def _where(self, error: Exception) -> str:
+        """Step, call and time of the step in which the algorithm raised."""
+        step = len(self._poses)
+        frames = traceback.extract_tb(error.__traceback__)
+        call = next((one.name for one in frames if one.filename != __file__), "call")
+        return f"at step {step} ({call}, time_us {self._times_us[step]})"
 
     def _run(self, alive: Callable[[int], None]) -> None:
         algorithm, clock, times_us = self._algorithm, time.thread_time_ns, self._times_us

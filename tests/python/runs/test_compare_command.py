@@ -69,7 +69,7 @@ def test_bad_algorithms_are_named_and_the_others_go_on(scene, capfd):
     lines = lines_of(scene / "out")
     assert {name for name, line in lines.items() if line["failed"]} == {"Raises", "Nan", "Dies", "Hangs"}
     for name, part in {
-        "Raises": "no idea",
+        "Raises": "ValueError: no idea at step 10 (observe, time_us ",
         "Nan": "step 10",
         "Dies": "signal 6",
         "Hangs": "after step 9",

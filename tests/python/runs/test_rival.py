@@ -237,6 +237,17 @@ def test_pose_that_cannot_be_is_named_with_its_step(made, pose, says):
     assert says in str(caught.value)
 
 
+def test_exception_of_an_algorithm_says_at_which_step_it_came(made):
+    class Wrong(Scribe):
+        def observe(self, time_us, sightings):
+            return 1 // (2 - sum(call == "odometry" for call, *_ in self.calls))
+
+    log = made.circle_log(5)
+    with pytest.raises(ZeroDivisionError) as caught:
+        told(log, RunOptions(), Wrong)
+    assert caught.value.__notes__ == [f"at step 2 (observe, time_us {log.odometry.time_us[1]})"]
+
+
 def test_map_that_cannot_be_is_named(made):
     class Wrong(Scribe):
         def map(self):
