@@ -76,7 +76,7 @@ _OF_THE_FILTER = ("filter", "known_map", "kept_map", "frozen", "recovery", "targ
 _TEXTS = ("association", "kept_map", "target")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A log that was run: what the filter said, and how good that was.
 
@@ -97,6 +97,8 @@ class Run:
     def __str__(self) -> str:
         entry = self.summary | {"name": self.log.name}
         return "\n".join([table([entry]), *entry["notes"], *entry["problems"]])
+
+    __repr__ = __str__
 
 
 def simulate(

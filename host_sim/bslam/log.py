@@ -188,7 +188,7 @@ class Robot:
     settings: tuple[tuple[str, int | float], ...] = setting(CORE_SETTINGS, ())  # of the core, as is
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Log:
     """One drive. `truth` and `beacons` (the true map) are there only if somebody knows them.
 
@@ -206,6 +206,15 @@ class Log:
     )
     words: tuple[str, ...] = ()  # what a beacon_id stands for where identities are words
     notes: tuple[str, ...] = ()  # what was left out when it was read, and why
+
+    def __repr__(self) -> str:
+        time_us, seen = self.odometry.time_us, self.sightings.beacon_id
+        beacons = len(np.unique(seen[seen >= 0]))
+        seconds = 1e-6 * float(time_us[-1] - time_us[0]) if len(time_us) else 0.0
+        return (
+            f"Log {self.name!r}: {len(time_us)} odometry rows, {len(seen)} sightings of {beacons} beacons, "
+            f"{seconds:.1f} s, truth: {'no' if self.truth is None else 'yes'}"
+        )
 
     def identity(self, number: int) -> str:
         """The identity as the log has it; none: empty."""

@@ -123,6 +123,12 @@ class Slam:
             self._settings.seeds, self._settings.seed_count = self._seeds, len(seeds)
         self._begin(self._robot)
 
+    def __repr__(self) -> str:
+        x_m, y_m, theta_rad = self.pose()
+        return (
+            f"Slam at x {x_m:.3g} m, y {y_m:.3g} m, theta {theta_rad:.3g} rad, {len(self.beacons())} beacons"
+        )
+
     def _set(self, params: Mapping[str, float]) -> None:
         if not isinstance(params, Mapping):
             raise BslamError(f"settings {params!r}: allowed is a mapping, names to numbers")

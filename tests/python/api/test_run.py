@@ -8,7 +8,7 @@ import pytest
 
 import bslam
 from api.tables import DRIVE
-from bslam import BslamError, Log
+from bslam import BslamError, Log, Slam
 from bslam.cli import main
 
 TOLD_WRONG = replace(DRIVE, sightings=replace(DRIVE.sightings, bearing_rad=-DRIVE.sightings.bearing_rad))
@@ -74,6 +74,15 @@ def test_a_run_says_what_the_filter_made() -> None:
     assert DRIVE.name in str(run) and "mean cm" in str(run)
     blind = replace(DRIVE, truth=None, beacons=None).run()
     assert blind.errors is None and "position_error_m" not in blind.summary
+
+
+def test_a_notebook_shows_a_line_of_a_log_and_the_table_of_a_run() -> None:
+    seen = len(DRIVE.sightings.time_us)
+    said = f"Log 'paper_room_seed3': 300 odometry rows, {seen} sightings of 6 beacons, 12.0 s, truth: yes"
+    assert repr(DRIVE) == said
+    run = DRIVE.run(association="known")
+    assert repr(run) == str(run)
+    assert repr(Slam({"wheelbase_m": 0.3})) == "Slam at x 0 m, y 0 m, theta 0 rad, 0 beacons"
 
 
 class Standstill:
