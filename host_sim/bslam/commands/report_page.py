@@ -21,17 +21,22 @@ from bslam.commands.arguments import positive_count, seeds_range, whole_number
 from bslam.commands.report import verdict
 from bslam.datasets.datasets import VARIABLE, data_root
 from bslam.errors import did_you_mean
-from bslam.evaluation.consistency import half_interval_95
+from bslam.evaluation.consistency import BELOW_95, half_interval_95
 from bslam.runs.batch import BatchResult, Job, run_batch
 from bslam.runs.output import write_atomically
 from bslam.runs.sweep import code_digest
 from bslam.runs.tables import (
+    BEST_TO_WORST,
+    PAPER_ROOM,
     STATISTICS,
     TITLES,
     Cell,
+    figure_of,
+    heading,
     heads,
-    make_cell,
     paper_figure,
+    runs_a_cell,
+    section_title,
     with_paper,
 )
 from bslam.view.report import Picture, Section, Table, render
@@ -156,25 +161,23 @@ def _tables(maker: _Maker) -> Section:
     jobs = tables.table_jobs(options)
     result = maker.run(jobs, "tables")
     by_cell = tables.group(jobs, result.outcomes)
-    cells = [cell for key, group in by_cell.items() if (cell := make_cell(*key, group)) is not None]
+    cells, scenario = tables.cells_of(jobs, by_cell), jobs[0].source.name
     sigmas = sorted({cell.sigma_mps for cell in cells})
     pictures = []
     room = maker.out / "tables" / f"{jobs[0].name}.map.png"
     if room.is_file():
-        pictures.append(Picture(room.read_bytes(), f"Figure 6: path, map and ellipses of {jobs[0].name}"))
+        figure = "Figure 6: " if scenario == PAPER_ROOM else ""
+        pictures.append(Picture(room.read_bytes(), f"{figure}path, map and ellipses of {jobs[0].name}"))
     for sigma_mps in sigmas:
-        caption = f"Figure {7 + sigmas.index(sigma_mps)}: error and NEES over time, sigma {sigma_mps:g} m/s"
+        caption = f"{figure_of(scenario, sigma_mps)}error and NEES over time, sigma {sigma_mps:g} m/s"
         pictures.append(Picture(tables.picture(sigma_mps, by_cell), caption))
-    found = [
-        _table_of_sigma(number, [one for one in cells if one.sigma_mps == sigma_mps])
-        for number, sigma_mps in enumerate(sigmas)
-    ]
-    what = f"{maker.scenario}, identity known, {len(maker.seeds)} runs a cell; cm."
+    found = [_table_of_sigma([one for one in cells if one.sigma_mps == sigma_mps]) for sigma_mps in sigmas]
+    what = f"{maker.scenario}, identity known, {runs_a_cell(len(maker.seeds))}; cm."
     said = verdict([one.entry for one in result.outcomes])
-    return Section("Tables I to III, Figures 6 to 9", [_line(words)], what, found, pictures, said)
+    return Section(heading(scenario), [_line(words)], what, found, pictures, said)
 
 
-def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
+def _table_of_sigma(cells: Sequence[Cell]) -> Table:
     rows = [["", *heads(cells)]]
     for name in STATISTICS:
         row = [TITLES[name]]
@@ -184,21 +187,22 @@ def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
             row.append(f"{cell.error_cm[name]:.2f}" + ("" if half is None else f" ± {half:.2f}"))
         rows.append(row)
     more: dict[str, Callable[[Cell], str]] = {
-        "Mean error of a run, best to worst": lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
+        BEST_TO_WORST: lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
         "First, last 50 s": lambda c: f"{c.first_50s_cm:.2f}, {c.last_50s_cm:.2f}",
         "Bound: Jacobians at the truth": lambda c: "-" if c.bound_cm is None else f"{c.bound_cm:.2f}",
         "Odometry alone": lambda c: f"{c.dead_reckoning_cm:.0f}",
         "NEES": lambda c: f"{c.nees_mean:.2f}",
-        "Steps below its 95 % quantile": lambda c: f"{100.0 * c.nees_inside_95:.1f} %",
+        f"NEES {BELOW_95}, of steps": lambda c: f"{100.0 * c.nees_inside_95:.1f} %",
         "Runs lost": lambda c: f"{c.lost} of {c.runs}",
     }
+    if all(cell.runs == 1 for cell in cells):
+        del more[BEST_TO_WORST]
     for title, text in more.items():
         row = [title]
         for cell, is_after_paper in with_paper(cells):
             row += ["", text(cell)] if is_after_paper else [text(cell)]
         rows.append(row)
-    roman = ("I", "II", "III")[number] if number < 3 else str(number + 1)
-    return Table(rows, f"Table {roman}: sigma {cells[0].sigma_mps:g} m/s")
+    return Table(rows, section_title(cells))
 
 
 def _bound(maker: _Maker) -> Section:

@@ -15,6 +15,7 @@ from bslam.commands.drawing import draw
 from bslam.commands.report import table_of
 from bslam.commands.sweep import add_files_option, add_restart_option, finish, make_runs
 from bslam.errors import did_you_mean
+from bslam.evaluation.consistency import BELOW_95
 from bslam.options import RunOptions
 from bslam.runs.batch import Job, make_jobs
 from bslam.runs.output import write_atomically
@@ -43,14 +44,24 @@ rows:
 
 Slips, loops and resume have the noise of real encoders, {ENCODERS_MPS} m/s, whatever --sigma says, and a
 nominal row of their own. A loop is driven in an empty hall, with the scenario's robot and sensor; its last
-50 s show whether it was closed. / nominal: mean error relative to the nominal row of the same sigma. inside:
-share of steps with the NEES below its 95 % quantile. lost: error above 2 m in the last 1000 steps, with
-Wilson's 95 % interval of the share. failed: lost; or 5 s above 1 m; or a map that is not exact; or NEES above
-20 over the last 50 s. {_TABLE}, {_PICTURE} and summary.json hold the table.
+50 s show whether it was closed. / nominal: mean error relative to the nominal row of the same sigma.
+{BELOW_95}: share of steps with such a NEES, 95 % if consistent. lost: error above 2 m in the last 1000 steps,
+with Wilson's 95 % interval of the share. failed: lost; or 5 s above 1 m; or a map that is not exact; or NEES
+above 20 over the last 50 s. {_TABLE}, {_PICTURE} and summary.json hold the table.
 
 Finished runs are kept as `bslam sweep` keeps them: after Ctrl-C the same command makes those that are
 missing."""
-_HEADINGS: Final = ("sigma", "runs", "cm", "/ nominal", "last 50 s", "NEES", "inside %", "lost", "failed")
+_HEADINGS: Final = (
+    "sigma",
+    "runs",
+    "cm",
+    "/ nominal",
+    "last 50 s",
+    "NEES",
+    f"{BELOW_95}, %",
+    "lost",
+    "failed",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

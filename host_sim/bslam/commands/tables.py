@@ -12,7 +12,7 @@ import numpy as np
 from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
 from bslam.commands.grid import Filters, grid_jobs
 from bslam.commands.report import finish, table_of
-from bslam.evaluation.consistency import nees_band_95
+from bslam.evaluation.consistency import BELOW_95, nees_band_95
 from bslam.evaluation.metrics import WINDOW_S
 from bslam.options import OBSERVATIONS
 from bslam.runs.batch import Job, Outcome, run_batch
@@ -23,8 +23,10 @@ from bslam.runs.tables import (
     SIGMAS_MPS,
     STATISTICS,
     Cell,
+    heading,
     make_cell,
     markdown,
+    runs_a_cell,
 )
 from bslam.view.series import Series, draw_cells
 from bslam.view.style import png
@@ -73,17 +75,23 @@ def execute(arguments: argparse.Namespace) -> int:
     jobs = table_jobs(arguments)
     result = run_batch(jobs, arguments.out, arguments.jobs)
     by_cell = group(jobs, result.outcomes)
-    cells = [cell for key, outcomes in by_cell.items() if (cell := make_cell(*key, outcomes)) is not None]
+    cells = cells_of(jobs, by_cell)
     pictures = {
         sigma_mps: _draw_sigma(arguments.out, sigma_mps, by_cell)
         for sigma_mps in {c.sigma_mps for c in cells}
     }
     room = f"{jobs[0].name}.map.png" if arguments.pictures > 0 else None
-    runs = len(arguments.seeds)
-    heading = f"Tables I to III: {arguments.scenario}, {runs} runs a cell"
-    write_atomically(arguments.out / "tables.md", markdown(cells, heading, pictures, room))
+    association, scenario = jobs[0].options.association, jobs[0].source.name
+    title = f"{heading(scenario)}: association {association}, {runs_a_cell(len(arguments.seeds))}"
+    write_atomically(arguments.out / "tables.md", markdown(cells, title, pictures, room))
     write_json(arguments.out / "tables.json", {"schema": 1, "cells": [cell.as_json() for cell in cells]})
-    return finish(result, arguments.out, table_of(_rows(cells)), more="tables.md, tables.json")
+    return finish(result, arguments.out, table_of(_rows(cells, association)), more="tables.md, tables.json")
+
+
+def cells_of(jobs: Sequence[Job], by_cell: dict[Key, list[Outcome]]) -> list[Cell]:
+    """The cells that have a figure."""
+    made = (make_cell(jobs[0].source.name, *key, outcomes) for key, outcomes in by_cell.items())
+    return [cell for cell in made if cell is not None]
 
 
 def group(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> dict[Key, list[Outcome]]:
@@ -117,14 +125,13 @@ def picture(sigma_mps: float, by_cell: dict[Key, list[Outcome]]) -> bytes:
     return png(draw_cells(f"Position error and NEES, sigma = {sigma_mps:g} m/s", cells))
 
 
-def _rows(cells: Sequence[Cell]) -> list[list[str]]:
-    """What is printed: paper / here."""
-    rows = [
-        ["cm: paper / here", *STATISTICS, "first 50 s", "last 50 s", "bound", "NEES", "inside 95 %", "lost"]
-    ]
+def _rows(cells: Sequence[Cell], association: str) -> list[list[str]]:
+    """What is printed: paper / here, or here alone."""
+    what = f"cm, {association}" + (": paper / here" if any(cell.paper_cm for cell in cells) else "")
+    rows = [[what, *STATISTICS, "first 50 s", "last 50 s", "bound", "NEES", BELOW_95, "lost"]]
     for cell in cells:
-        paper = cell.paper_cm or {}
-        pairs = [f"{paper.get(name, float('nan')):g} / {cell.error_cm[name]:.2f}" for name in STATISTICS]
+        paper = {name: f"{value:g} / " for name, value in (cell.paper_cm or {}).items()}
+        pairs = [f"{paper.get(name, '')}{cell.error_cm[name]:.2f}" for name in STATISTICS]
         rest = [f"{cell.first_50s_cm:.2f}", f"{cell.last_50s_cm:.2f}"]
         rest += ["-" if cell.bound_cm is None else f"{cell.bound_cm:.2f}", f"{cell.nees_mean:.2f}"]
         rest += [f"{100 * cell.nees_inside_95:.1f} %", f"{cell.lost}/{cell.runs}"]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bslam.evaluation.align import wrap_angle
 
 POSE_95: Final = 7.815  # chi-square, 3 degrees of freedom: 95 % of a consistent filter's NEES lie below
+BELOW_95: Final = f"below {POSE_95:g}"  # in tables
 RUNS_FOR_INTERVAL: Final = 5
 SINGULAR: Final = 1e9  # stands for the infinite NEES of a covariance that is not positive definite
 

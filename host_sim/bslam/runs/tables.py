@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from bslam.evaluation.consistency import half_interval_95, nees_band_95
+from bslam.evaluation.consistency import BELOW_95, half_interval_95, nees_band_95
 from bslam.runs.batch import Outcome
 
 STATISTICS: Final = ("max", "min", "mean", "std")  # in the paper's order
@@ -36,12 +36,15 @@ PAPER_CM: Final[dict[tuple[float, str], dict[str, float]]] = {
     (1.0, "direction"): {"max": 57.78, "min": 1.03, "mean": 22.83, "std": 10.01},
 }
 SIGMAS_MPS: Final = (0.3, 0.6, 1.0)
+PAPER_ROOM: Final = "paper_room"
+BEST_TO_WORST: Final = "Mean error, best to worst run"
 
 
 @dataclass(frozen=True)
 class Cell:
     """One sigma, observation and filter: means over the runs of the runs' own statistics."""
 
+    scenario: str
     sigma_mps: float
     observation: str
     filter: str
@@ -56,14 +59,14 @@ class Cell:
     dead_reckoning_cm: float
     bound_cm: float | None  # what a filter linearised at the truth leaves, see bound.py; None: not computed
     nees_mean: float
-    nees_inside_95: float  # share of steps, all runs, each alone below the 95 % quantile
+    nees_inside_95: float  # share of steps, all runs, each alone below POSE_95
     nees_band: tuple[float, float]  # 95 % band of the NEES averaged over the runs at one step
     nees_in_band: float  # share of steps at which that average lies in the band
 
     @property
     def paper_cm(self) -> dict[str, float] | None:
-        """What the paper has in this cell, None where it has no such sigma."""
-        return PAPER_CM.get((self.sigma_mps, self.observation))
+        """What the paper has in this cell, None where it has no such room or sigma."""
+        return PAPER_CM.get((self.sigma_mps, self.observation)) if self.scenario == PAPER_ROOM else None
 
     def as_json(self) -> dict[str, Any]:
         """For tables.json."""
@@ -71,7 +74,7 @@ class Cell:
 
 
 def make_cell(
-    sigma_mps: float, observation: str, filter_name: str, outcomes: Sequence[Outcome]
+    scenario: str, sigma_mps: float, observation: str, filter_name: str, outcomes: Sequence[Outcome]
 ) -> Cell | None:
     """The cell of these runs; None if every one of them failed."""
     entries = [one.entry for one in outcomes if "position_error_m" in one.entry]
@@ -86,6 +89,7 @@ def make_cell(
     band = nees_band_95(len(entries))
     half_m = half_interval_95([error["mean"] for error in errors])
     return Cell(
+        scenario=scenario,
         sigma_mps=sigma_mps,
         observation=observation,
         filter=filter_name,
@@ -119,26 +123,42 @@ def markdown(
     """The tables as a document; `pictures` by sigma and `room_picture` are file names beside it."""
     lines = [f"# {heading}", ""]
     lines += [
-        "Position error, estimated against true position at every step, in cm. The paper shows one run in",
-        "each cell; here each figure is the mean over the runs of that run's figure. NEES of the pose: 3 is",
-        "consistent; the band holds 95 % of a consistent filter's NEES averaged over the runs at one step.",
+        "Position error, estimated against true position at every step, in cm: means over the runs of each",
+        "run's figure; the paper shows one run. NEES of the pose: 3 is consistent; the band holds 95 % of a",
+        "consistent filter's NEES averaged over the runs at one step.",
         "",
     ]
     if room_picture is not None:
-        lines += ["## The room (compare Fig. 6)", "", f"![room]({room_picture})", ""]
-    for number, sigma_mps in enumerate(sorted({cell.sigma_mps for cell in cells})):
+        lines += ["## The room", "", f"![room]({room_picture})", ""]
+    for sigma_mps in sorted({cell.sigma_mps for cell in cells}):
         of_sigma = [cell for cell in cells if cell.sigma_mps == sigma_mps]
-        lines += [_section_title(number, sigma_mps), "", *_table(of_sigma), ""]
+        lines += [f"## {section_title(of_sigma)}", "", *_table(of_sigma), ""]
         if sigma_mps in pictures:
             lines += [f"![error over time, sigma {sigma_mps:g}]({pictures[sigma_mps]})", ""]
     return "\n".join(lines)
 
 
-def _section_title(number: int, sigma_mps: float) -> str:
-    if sigma_mps not in SIGMAS_MPS:
-        return f"## sigma = {sigma_mps:g} m/s"
-    roman = ("I", "II", "III")[SIGMAS_MPS.index(sigma_mps)]
-    return f"## Table {roman}: sigma = {sigma_mps:g} m/s (compare Fig. {7 + SIGMAS_MPS.index(sigma_mps)})"
+def heading(scenario: str) -> str:
+    """Of all tables."""
+    return "Tables I to III, Figures 6 to 9" if scenario == PAPER_ROOM else f"Tables of {scenario}"
+
+
+def figure_of(scenario: str, sigma_mps: float) -> str:
+    """The paper's figure to compare a picture with, and a colon; empty if there is none."""
+    there = scenario == PAPER_ROOM and sigma_mps in SIGMAS_MPS
+    return f"Figure {7 + SIGMAS_MPS.index(sigma_mps)}: " if there else ""
+
+
+def section_title(cells: Sequence[Cell]) -> str:
+    """Of the cells of one sigma, by the paper's table if it has one."""
+    sigma_mps = cells[0].sigma_mps
+    table = f"Table {('I', 'II', 'III')[SIGMAS_MPS.index(sigma_mps)]}: " if cells[0].paper_cm else ""
+    return f"{table}sigma {sigma_mps:g} m/s"
+
+
+def runs_a_cell(count: int) -> str:
+    """So many, in words."""
+    return f"{count} run{'' if count == 1 else 's'} a cell"
 
 
 def _table(cells: Sequence[Cell]) -> list[str]:
@@ -151,7 +171,7 @@ def _table(cells: Sequence[Cell]) -> list[str]:
             row += f" {cell.error_cm[name]:.2f} |"
         lines.append(row)
     extra = {
-        "Mean error, best to worst run": lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
+        BEST_TO_WORST: lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
         "Mean error, first 50 s": lambda c: f"{c.first_50s_cm:.2f}",
         "Mean error, last 50 s": lambda c: f"{c.last_50s_cm:.2f}",
         "Mean error of the bound: Jacobians at the truth": lambda c: (
@@ -159,12 +179,14 @@ def _table(cells: Sequence[Cell]) -> list[str]:
         ),
         "Mean error of odometry alone": lambda c: f"{c.dead_reckoning_cm:.0f}",
         "NEES (3 is consistent)": lambda c: f"{c.nees_mean:.2f}",
-        "Steps below the 95 % quantile": lambda c: f"{100 * c.nees_inside_95:.1f} %",
+        f"NEES {BELOW_95}, of steps": lambda c: f"{100 * c.nees_inside_95:.1f} %",
         "Steps with the mean over runs in its band": lambda c: (
             f"{100 * c.nees_in_band:.0f} % in {c.nees_band[0]:.2f} to {c.nees_band[1]:.2f}"
         ),
         "Runs lost": lambda c: str(c.lost),
     }
+    if all(cell.runs == 1 for cell in cells):
+        del extra[BEST_TO_WORST]
     for title, text in extra.items():
         row = "".join(
             (" |" if is_after_paper else "") + f" {text(cell)} |"
@@ -175,9 +197,10 @@ def _table(cells: Sequence[Cell]) -> list[str]:
 
 
 def with_paper(cells: Sequence[Cell]) -> list[tuple[Cell, bool]]:
-    """Each cell, and whether the paper's column stands before it: before the first of an observation."""
+    """Each cell, and whether the paper's column stands before it: before the first of an observation, where
+    the paper has one."""
     return [
-        (cell, number == 0 or cell.observation != cells[number - 1].observation)
+        (cell, bool(cell.paper_cm) and (number == 0 or cell.observation != cells[number - 1].observation))
         for number, cell in enumerate(cells)
     ]
 

@@ -23,8 +23,9 @@ def short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A scenario of a few steps, and no real data."""
     monkeypatch.setenv("BSLAM_DATA", str(tmp_path))
     kill_sweep.write_sweep(tmp_path, 2)
-    path = tmp_path / "short.toml"
-    path.write_text(path.read_text().replace(f"steps = {kill_sweep.STEPS}", "steps = 100"))
+    path = tmp_path / "paper_room.toml"
+    text = (tmp_path / "short.toml").read_text()
+    path.write_text(text.replace(f"steps = {kill_sweep.STEPS}", "steps = 100"))
     return path
 
 

@@ -258,7 +258,8 @@ def test_tables_writes_the_paper_s_figures_beside_ours(tmp_path):
     )
     text = (out / "tables.md").read_text()
     assert "| Mean error | 10.11 |" in text
-    assert "## Table II" in text
+    assert text.startswith("# Tables I to III, Figures 6 to 9: association both, 2 runs a cell")
+    assert "## Table II" in text and "best to worst" in text
     cells = json.loads((out / "tables.json").read_text())["cells"]
     directions = [("direction", name) for name in ("invariant", "smoother")]
     assert [(cell["observation"], cell["filter"]) for cell in cells] == [
@@ -273,6 +274,17 @@ def test_tables_writes_the_paper_s_figures_beside_ours(tmp_path):
     assert cells[0]["error_cm"]["mean"] == pytest.approx(100.0 * np.mean(own))
     assert (out / "sigma0.6.png").read_bytes().startswith(b"\x89PNG")
     assert len(runs(out)) == 6
+
+
+def test_tables_of_another_room_are_not_the_paper_s(tmp_path, capsys):
+    words = ["tables", "--scenario", "pairs", "--sigma", "1.0", "--observation", "distance", "--seeds", "0:1"]
+    assert main([*words, "--jobs", "1", "--pictures", "0", "--out", str(tmp_path)]) == 0
+    text, said = (tmp_path / "tables.md").read_text(), capsys.readouterr().out
+    assert text.startswith("# Tables of pairs: association both, 1 run a cell")
+    assert "## sigma 1 m/s" in text and "| cm | Distance observation: invariant filter |" in text
+    assert "best to worst" not in text and said.startswith("cm, both  ") and "below 7.815" in said
+    (cell,) = json.loads((tmp_path / "tables.json").read_text())["cells"]
+    assert cell["scenario"] == "pairs" and "paper_cm" not in cell
 
 
 def test_sweep_runs_every_combination(tmp_path, capsys):
