@@ -4,11 +4,13 @@
 SITE_VENV := build/site/venv
 SITE_STAMP := $(SITE_VENV)/stamp
 SITE_PAGES := build/site/docs
+SITE_NOTEBOOKS := build/site/notebooks
 PLAYGROUND_HTML := out/playground/index.html
 
 .PHONY: site
-site: $(SITE_STAMP) playground ## documents, headers, notebooks, pictures, playground as a site: out/site
-	@$(SITE_VENV)/bin/python -m tools.site_pages $(SITE_PAGES)
+site: setup $(SITE_STAMP) playground ## documents, headers, notebooks, pictures, playground as a site: out/site
+	@$(PYTHON) notebooks/run.py $(SITE_NOTEBOOKS)
+	@$(SITE_VENV)/bin/python -m tools.site_pages $(SITE_PAGES) $(SITE_NOTEBOOKS)
 	@test ! -f $(PLAYGROUND_HTML) || install -D $(PLAYGROUND_HTML) $(SITE_PAGES)/playground/index.html
 	@NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs --quiet build --strict
 	@echo "site: open out/site/index.html"

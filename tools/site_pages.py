@@ -1,6 +1,6 @@
 """Writes what mkdocs makes the site of (`make site`): documents, headers, notebooks, and what they lead to.
 
-python -m tools.site_pages build/site/docs
+python -m tools.site_pages build/site/docs build/site/notebooks
 """
 
 import json
@@ -16,7 +16,7 @@ DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "examp
 HEADERS = ("firmware/bslam/bslam.h", "firmware/vision/vision.h")
 LINK = re.compile(r"\]\((?!\w+:|#)([^)#\s]+)")
 CODE = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
-MATHS = re.compile(r"^\$\$\n(.*?)\n\$\$$|\$([^$\n]+)\$", re.MULTILINE | re.DOTALL)
+MATHS = re.compile(r"^\$\$(.+?)\$\$$|\$([^$\n]+)\$", re.MULTILINE | re.DOTALL)
 FENCED_MATHS = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 QUOTED_LIST = re.compile(r"^(> (?!- ).*)\n(?=> - )", re.MULTILINE)  # begins a paragraph to mkdocs
 UNKNOWN_TEX = {r"\cr": r"\\", "{gathered}": "{matrix}", r"\arg": r"\mathrm{arg}"}  # of latex2mathml
@@ -52,12 +52,12 @@ def notebook(path: Path) -> Iterator[str]:
                 yield f"```text\n{printed}\n```"
 
 
-def pages() -> dict[str, tuple[str, str]]:
+def pages(notebooks: Path = ROOT / "notebooks") -> dict[str, tuple[str, str]]:
     """Every page but the gallery: its place in the site, and its Markdown, by its path in the repository."""
     found = {str(path.relative_to(ROOT)): path for glob in DOCUMENTS for path in sorted(ROOT.glob(glob))}
     texts = {path: file.read_text(encoding="utf-8") for path, file in found.items()}
     texts |= {path: reference(ROOT / path) for path in HEADERS}
-    texts |= {f"notebooks/{one.name}": "\n\n".join(notebook(one)) for one in ROOT.glob("notebooks/*.ipynb")}
+    texts |= {f"notebooks/{one.name}": "\n\n".join(notebook(one)) for one in notebooks.glob("*.ipynb")}
     return {path: (_place(path), text) for path, text in texts.items()}
 
 
@@ -114,10 +114,10 @@ def with_maths(text: str) -> str:
     return "".join(part if number % 2 else MATHS.sub(mathml, part) for number, part in enumerate(parts))
 
 
-def main(folder: Path) -> int:
-    """Write all pages, and what they lead to."""
+def main(folder: Path, notebooks: Path) -> int:
+    """Write all pages, and what they lead to; notebooks: as they were run."""
     shutil.rmtree(folder, ignore_errors=True)
-    written = pages()
+    written = pages(notebooks)
     written["gallery.md"] = ("gallery.md", gallery({path: text for path, (_, text) in written.items()}))
     places = {path: place for path, (place, _) in written.items()}
     for path, (place, text) in written.items():
@@ -132,4 +132,4 @@ def main(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(*map(Path, sys.argv[1:])))

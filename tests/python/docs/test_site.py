@@ -11,7 +11,7 @@ import re
 import pytest
 
 from docs.reading import ROOT, read
-from tools.site_pages import HEADERS, LINK, gallery, linked, notebook, pages, reference
+from tools.site_pages import CODE, HEADERS, LINK, MATHS, gallery, linked, notebook, pages, reference
 
 PAGES = pages()
 PLACES = {path: place for path, (place, _) in PAGES.items()}
@@ -63,6 +63,13 @@ def test_notebook_shows_cells_and_what_they_printed_and_drew(tmp_path):
         "```text\n3\n```",
         "![drawn](data:image/png;base64,aGk=)",
     ]
+
+
+def test_equations_are_found_as_documents_and_notebooks_write_them():
+    found = [one.groups() for one in MATHS.finditer("with $e$:\n\n$$a = b,$$\n\n$$\nc\n$$\n")]
+    assert found == [(None, "e"), ("a = b,", None), ("\nc\n", None)]
+    for path, (_, text) in PAGES.items():
+        assert "$$" not in MATHS.sub("", CODE.sub("", text)), path
 
 
 def test_gallery_has_every_picture_that_is_there():
