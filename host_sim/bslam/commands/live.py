@@ -22,7 +22,7 @@ from bslam.commands.report import finish
 from bslam.datasets.datasets import is_bag, line_to_type
 from bslam.errors import BslamError
 from bslam.log import Log
-from bslam.moment import FAILED
+from bslam.moment import FAILED, FINISHED
 from bslam.options import RunOptions
 from bslam.recording.reader import SUFFIX
 from bslam.rig import load_rig
@@ -30,7 +30,7 @@ from bslam.runs.batch import BatchResult, Job, Outcome, make_jobs, run_job, writ
 from bslam.runs.camera import unseen_log
 from bslam.runs.eye import Eye
 from bslam.runs.output import write_summary
-from bslam.runs.player import Player
+from bslam.runs.player import Pace, Player
 from bslam.runs.rerun import options_of
 from bslam.runs.runner import Watcher
 from bslam.runs.sources import CameraSource, RecordingSource, Source
@@ -106,9 +106,13 @@ def execute(arguments: argparse.Namespace) -> int:
     show = _Show(job, arguments.out.absolute(), arguments.speed)
 
     def open_page(document) -> None:  # type: ignore[no-untyped-def]
-        Page(document, show.stage, lambda: show.player.moment, show.player.pace)
+        Page(document, show.stage, lambda: show.player.moment, show.pace, show.start)
+        # Not before a browser has all of the page: whoever watches sees the first step.
+        document.on_event("document_ready", lambda _event: begin())
+
+    def begin() -> None:
         if not arguments.paused and not show.opened:
-            show.player.pace.play()
+            show.pace.play()
         show.opened = True
 
     def say(url: str) -> None:
@@ -116,7 +120,7 @@ def execute(arguments: argparse.Namespace) -> int:
         if not has_screen():
             port = url.rstrip("/").rpartition(":")[2]
             print(f"from another machine: ssh -L {port}:127.0.0.1:{port} {os.uname().nodename}", flush=True)
-        show.player.start()
+        show.start()
 
     try:
         serve(open_page, arguments.port, say, browse=not arguments.no_browser)
@@ -131,8 +135,8 @@ def _follow_in_rerun(arguments: argparse.Namespace) -> int:
     """The same run, followed by Rerun's viewer; it has no buttons for the run."""
     show = _Show(_job(arguments), arguments.out.absolute(), arguments.speed)
     stream = open_stream(arguments.rerun)  # last: a file of that name is emptied
-    show.player.start()
-    show.player.pace.play()
+    show.start()
+    show.pace.play()
     try:
         follow(Scene(show.stage, stream), lambda: show.player.moment)
     except KeyboardInterrupt:
@@ -147,13 +151,23 @@ class _Show:
     """The run behind the page, and what it leaves."""
 
     def __init__(self, job: Job, out: Path, speed: float) -> None:
-        log, eye = _open(job)
-        self.stage = stage_of(job, log)
+        self._job, self._out = job, out
+        self._log, self._eye = _open(job)
+        self.stage = stage_of(job, self._log)
         self.opened = False
-        self._job, self._log, self._out = job, log, out
         self._outcome: Outcome | None = None
-        self._eye = eye
-        self.player = Player(log, self._run, align=self.stage.aligned, speed=speed, eye=eye)
+        self.pace = Pace(speed)
+        self.player = self._new_player()
+
+    def _new_player(self) -> Player:
+        return Player(self._log, self._run, self.pace, align=self.stage.aligned, eye=self._eye)
+
+    def start(self) -> None:
+        """Take the run up; one that has ended, from its start."""
+        if self.player.moment.state == FINISHED:
+            self._log, self._eye = _open(self._job)
+            self.player = self._new_player()
+        self.player.start()
 
     def _run(self, watcher: Watcher) -> None:
         """All of it, and its files; in the player's thread."""

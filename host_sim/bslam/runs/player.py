@@ -111,20 +111,20 @@ class Pace:
 class Player:
     """One run over a log. It stands at the start until `pace` is told to play or to step.
 
-    run: runs the filter over the log and tells the watcher it is given; in a thread of its own. align: the
-    truth has a frame of its own. eye: what it sees is shown.
+    run: runs the filter over the log and tells the watcher it is given; in a thread of its own. pace: of this
+    run, and of one after it. align: the truth has a frame of its own. eye: what it sees is shown.
     """
 
     def __init__(
         self,
         log: Log,
         run: Callable[[Watcher], None],
+        pace: Pace,
         *,
         align: bool = False,
-        speed: float = 1.0,
         eye: Eye | None = None,
     ) -> None:
-        self.pace = Pace(speed)
+        self.pace = pace
         self._run_it = run
         self._books = Books(log, align, eye)
         self._published_s, self._stale = 0.0, False

@@ -68,8 +68,8 @@ _TRUE_BEACON: Final = "#6b4b00"
 _SIGMA_DASH: Final = [6, 3]
 
 _HELP: Final = (
-    "Each ray is a sighting of this moment, in the colour of what the filter made of it. Play, or Step by "
-    "step; zoom and pan with the tools beside a plot."
+    "Each ray is a sighting of this moment, in the colour of what the filter made of it. Pause, then Step or "
+    "Play; at the end, Again. Zoom and pan with the tools beside a plot."
 )
 
 
@@ -206,12 +206,17 @@ class Controls(Protocol):
 
 
 class Page:
-    """One document. moment: gives the newest state of the run."""
+    """One document. moment: gives the newest state of the run. again: takes up a run that has ended."""
 
     def __init__(
-        self, document: Document, stage: Stage, moment: Callable[[], Moment], controls: Controls
+        self,
+        document: Document,
+        stage: Stage,
+        moment: Callable[[], Moment],
+        controls: Controls,
+        again: Callable[[], None],
     ) -> None:
-        self._stage, self._moment, self._controls = stage, moment, controls
+        self._stage, self._moment, self._controls, self._again = stage, moment, controls, again
         self._drawn: Moment | None = None
         self._under_way = 0  # moments that were sent and that the browser has not drawn yet
         # Rows of the course that are in the document, and the truth that they belong to, by source.
@@ -269,7 +274,10 @@ class Page:
         self.refresh()
 
     def _toggle(self) -> None:
-        if self._controls.playing:
+        has_ended = self._moment().state == FINISHED
+        if has_ended:
+            self._again()
+        if self._controls.playing and not has_ended:
             self._controls.pause()
         else:
             self._controls.play()
@@ -361,8 +369,10 @@ class Page:
         if moment is self._drawn or self._under_way >= _UNDER_WAY_MOST:
             return
         self._drawn = moment
-        self._pause.label = "Pause" if self._controls.playing else "Play"
-        self._pause.disabled = self._step.disabled = moment.state in (FINISHED, FAILED)
+        has_ended = moment.state == FINISHED
+        self._pause.label = "Again" if has_ended else "Pause" if self._controls.playing else "Play"
+        self._pause.disabled = moment.state == FAILED
+        self._step.disabled = moment.state in (FINISHED, FAILED)
         if moment.shown is not None:  # before the status, whose change shows it
             self._sources["frame"].data = {"src": [_frame_url(moment.shown)]}
         words = self._words(moment)

@@ -7,6 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
+import time
+import urllib.request
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -168,6 +170,24 @@ def test_live_says_what_was_wrong_and_fits_a_phone(page: Page, short: Path, tmp_
             page.set_viewport_size({"width": width, "height": 740})
             assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert command.end()[0] == 0
+
+
+def test_live_waits_for_a_browser_and_begins_again(page: Page, short: Path, tmp_path: Path) -> None:
+    with live(short, "--speed", "inf", out=tmp_path) as command:
+        with urllib.request.urlopen(command.url) as answer:  # asks for the page and shows it nobody
+            answer.read()
+        time.sleep(0.5)
+        assert not (tmp_path / "summary.json").exists()
+        page.goto(command.url)
+        expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
+        (tmp_path / "summary.json").unlink()
+        click(page, "1/4")
+        click(page, "Again")
+        expect(page.get_by_text(re.compile("running · step [12345] of 60"))).to_be_visible()
+        click(page, "as fast as it goes")
+        expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
+        assert command.end()[0] == 0
+    assert (tmp_path / "summary.json").exists()
 
 
 def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
