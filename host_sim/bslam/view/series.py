@@ -15,6 +15,7 @@ from bslam.view.style import BAND, ESTIMATE, SECOND, TRUTH, moving_mean, new_fig
 _SMOOTH_S: Final = 5.0
 _PAGE_IN: Final = 9.6
 _TOP: Final = 1.5  # room for the legend above the highest error
+_NEES_TOP: Final = 0.35  # the same above the highest NEES, as a share of a logarithmic scale
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Series:
     error_m: NDArray[Any]  # (runs, n), NaN where it is not known
     nees: NDArray[Any]  # (runs, n), NaN where there is none
     nees_band: tuple[float, float]  # holds 95 % of a consistent filter's NEES, averaged over the runs
-    window_s: float  # the means of this long at both ends are drawn
+    window_s: float  # the means of this long at both ends are drawn; of half the run, if that is less
 
 
 def draw_run(series: Series) -> Figure:
@@ -76,10 +77,9 @@ def draw_error(axes: Any, series: Series) -> None:
     mean_cm = _mean_over_runs(error_cm)
     if several:
         axes.plot(time_s, mean_cm, color=ESTIMATE, linewidth=1.6, label=f"mean of {len(error_cm)} runs")
-    _draw_window(axes, time_s, mean_cm, time_s <= series.window_s, f"first {series.window_s:g} s", "-")
-    _draw_window(
-        axes, time_s, mean_cm, time_s > time_s[-1] - series.window_s, f"last {series.window_s:g} s", "--"
-    )
+    window_s = min(series.window_s, 0.5 * float(time_s[-1] - time_s[0]))
+    _draw_window(axes, time_s, mean_cm, time_s <= time_s[0] + window_s, f"first {window_s:.3g} s", "-")
+    _draw_window(axes, time_s, mean_cm, time_s > time_s[-1] - window_s, f"last {window_s:.3g} s", "--")
     axes.set_ylim(0.0, _TOP * _highest_cm(series))
     axes.set_xlim(float(time_s[0]), float(time_s[-1]))
     tidy(axes, "time, s", "position error, cm")
@@ -98,7 +98,8 @@ def draw_nees(axes: Any, series: Series) -> None:
         window = max(1, round(_SMOOTH_S / float(np.median(np.diff(series.time_s)))))
         label = f"{_SMOOTH_S:g} s mean; over all {mean[known].mean():.2f}"
         axes.plot(series.time_s, moving_mean(mean, window), color=ESTIMATE, linewidth=1.8, label=label)
-        axes.set_ylim(max(0.01, 0.7 * float(mean[known].min())), max(20.0, 1.5 * float(mean[known].max())))
+        least, most = max(0.01, 0.7 * float(mean[known].min())), max(20.0, 1.5 * float(mean[known].max()))
+        axes.set_ylim(least, most * (most / least) ** _NEES_TOP)
     axes.set_yscale("log")
     axes.set_xlim(float(series.time_s[0]), float(series.time_s[-1]))
     tidy(axes, "time, s", "NEES of the pose")

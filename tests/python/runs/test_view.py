@@ -71,12 +71,25 @@ def test_room_is_not_shrunk_by_an_estimate_that_got_lost(made):
 
 
 def test_run_shows_the_means_at_both_ends():
-    figure = draw_run(series())
+    figure = draw_run(series(steps=3000))
     pixels(figure)
     names = texts(figure.axes[0])
     assert names[0] == "position error"
     assert [name.split(":")[0] for name in names[1:]] == ["first 50 s", "last 50 s"]
     assert any("95 % band, 0.2 to 9.3" in name for name in texts(figure.axes[1]))
+
+
+def test_a_short_run_is_halved_for_the_means_at_its_ends():
+    names = texts(draw_run(series(steps=1001)).axes[0])
+    assert [name.split(":")[0] for name in names[1:]] == ["first 20 s", "last 20 s"]
+
+
+def test_legend_of_nees_lies_above_the_curve():
+    figure = draw_run(series())
+    pixels(figure)
+    axes = figure.axes[1]
+    legend = axes.get_legend().get_window_extent().transformed(axes.transData.inverted())
+    assert legend.y0 > max(np.nanmax(line.get_ydata()) for line in axes.get_lines())
 
 
 def test_pair_shares_one_scale_that_a_lost_run_does_not_stretch():
