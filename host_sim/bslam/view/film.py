@@ -32,6 +32,7 @@ _LEVELS: Final = 5  # of each colour in a GIF's palette
 _SIGMAS: Final = 2.0
 _RAY_M: Final = 3.0  # of a sighting without a distance
 _NOSE_M: Final = 0.45
+_PROVISIONAL: Final = (SECOND, 0.4)  # a beacon that the filter has yet to confirm
 _SHOWN: Final = {"matched": "fused", "wrong": "wrong", "new": "new beacon", "rejected": "rejected"}
 
 
@@ -60,6 +61,7 @@ class _Scene:
         self._path = axes.plot([], [], color=ESTIMATE, linewidth=1.1, label="estimate")[0]
         self._rays = axes.add_collection(LineCollection([], zorder=2))
         self._map = axes.plot([], [], "+", color=SECOND, markersize=7, zorder=4, label="map, 2 sigma")[0]
+        axes.plot([], [], "o", color=_PROVISIONAL, fillstyle="none", markersize=8, label="provisional")
         self._ellipses: Any = None
         style: dict[str, Any] = {"linewidth": 2.5, "marker": "o", "markevery": [0], "markersize": 7}
         self._robots = [axes.plot([], [], color=one, zorder=5, **style)[0] for one in (TRUTH, ESTIMATE)]
@@ -69,7 +71,7 @@ class _Scene:
         axes.set_xlim(x_low, x_high)
         axes.set_ylim(y_low, y_high)
         tidy(axes, "x, m", "y, m")
-        style = {"ncols": 7, "fontsize": 8, "frameon": False, "columnspacing": 1.2}
+        style = {"ncols": 4, "fontsize": 8, "frameon": False, "columnspacing": 1.2}
         self.figure.legend(loc="outside lower center", **style)
 
     def _draw_error(self, last: Moment) -> None:
@@ -115,7 +117,7 @@ class _Scene:
             offsets=[place for place, _ in places],
             offset_transform=self._room.transData,
             facecolors="none",
-            edgecolors=[*[(SECOND, 1.0 if one.confirmed else 0.4) for one in moment.beacons], ESTIMATE],
+            edgecolors=[*[SECOND if one.confirmed else _PROVISIONAL for one in moment.beacons], ESTIMATE],
             linewidths=1.3,
             zorder=4,
         )

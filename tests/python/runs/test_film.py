@@ -1,16 +1,18 @@
 """`bslam run --film`: a picture that moves, the same for the same seed."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
 import bslam
 from bslam.cli import main
 from bslam.commands.report import verdict
-from bslam.view.style import RESULT_COLOURS
+from bslam.view.style import RESULT_COLOURS, SECOND
 
 STEPS = 12
 
@@ -24,9 +26,13 @@ def short(tmp_path: Path) -> Path:
     return path
 
 
-def shows(frame: Image.Image, colour: str) -> bool:
+def count(frame: Image.Image, rgb: Sequence[float] | NDArray[np.float64]) -> int:
     pixels = np.asarray(frame.convert("RGB")).astype(int)
-    return bool((np.abs(pixels - ImageColor.getrgb(colour)).max(axis=2) < 8).any())
+    return int((np.abs(pixels - rgb).max(axis=2) < 8).sum())
+
+
+def shows(frame: Image.Image, colour: str) -> bool:
+    return count(frame, ImageColor.getrgb(colour)) > 0
 
 
 def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path, tmp_path: Path) -> None:
@@ -41,11 +47,12 @@ def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path
         counts = []
         for frame in (0, STEPS):
             film.seek(frame)
-            pixels = np.asarray(film.convert("RGB")).astype(int)
-            fused = ImageColor.getrgb(RESULT_COLOURS["matched"])
-            counts.append(int((np.abs(pixels - fused).max(axis=2) < 8).sum()))
+            counts.append(count(film, ImageColor.getrgb(RESULT_COLOURS["matched"])))
             assert all(shows(film, RESULT_COLOURS[one]) for one in ("matched", "wrong", "new"))
         assert counts[1] > 2 * counts[0]
+        # Provisional beacons are in the legend when none is in the room any more.
+        pale = 255 - 0.4 * (255 - np.array(ImageColor.getrgb(SECOND)))
+        assert count(film, pale) > 25
 
 
 def test_film_may_be_webp(short: Path, tmp_path: Path) -> None:
