@@ -117,7 +117,7 @@ _TEMPLATE: Final = """
   .parts { display: grid; grid-template-columns: minmax(0, 1fr); gap: 8px 20px; }
   @media (min-width: 1000px) {
     .parts { grid-template-columns: minmax(0, min(58%, var(--wide))) minmax(0, 50em); }
-    .parts { --wide: max(400px, calc((100vh - 450px) / {{ ratio }} + {{ beside_px }}px)); }
+    .parts { --wide: max(400px, calc((100vh - 456px) / {{ ratio }} + {{ beside_px }}px)); }
   }
   .room {
     position: relative;
