@@ -1,6 +1,7 @@
 """`bslam report`, opened in a real browser: it holds all it shows, and what it shows is what was run."""
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +43,16 @@ def test_report_holds_its_pictures_and_the_figures_of_its_runs(
         page.get_by_text(f"bslam tables --scenario {short} --association known --seeds 3:5")
     ).to_be_visible()
     widths = page.evaluate("[...document.images].map(one => one.complete && one.naturalWidth)")
-    assert len(widths) == 4 and all(width > 500 for width in widths)  # Figures 6 to 9
+    assert len(widths) == 6 and all(width > 500 for width in widths)  # the worst run's two, Figures 6 to 9
+    expect(page.get_by_text("Lost means: the error was above 2 m")).to_be_visible()
     runs = json.loads((out / "tables/summary.json").read_text())["runs"]
     cell = [one for one in runs if one["sigma_mps"] == 1.0 and one["observation"] == "distance"]
+    worst_m = max(one["position_error_m"]["mean"] for one in runs)
+    caption = page.get_by_text("Worst run, error: ").inner_text()
+    again = shlex.split(caption.partition("bslam ")[2])
+    assert main([*again, "--pictures", "0", "--jobs", "1", "--out", str(tmp_path / "again")]) == 0
+    made = json.loads((tmp_path / "again/summary.json").read_text())["runs"][0]
+    assert made["position_error_m"]["mean"] == worst_m
     mean_cm = 100.0 * np.mean([one["position_error_m"]["mean"] for one in cell])
     table = page.get_by_role("table").filter(has_text="Table III")
     row = table.get_by_role("row", name="Mean error", exact=False).first
