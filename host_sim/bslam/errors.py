@@ -20,7 +20,7 @@ def did_you_mean(word: object, allowed: Iterable[str]) -> str:
     return "" if name is None else f"; did you mean {name!r}?"
 
 
-def nearest(word: str, allowed: Iterable[str]) -> str | None:
+def nearest(word: object, allowed: Iterable[str]) -> str | None:
     """The allowed name that is most like `word`; None where none is near."""
     by_plain_name = {_plain(name): name for name in allowed}
     found = get_close_matches(_plain(word), by_plain_name, n=1)
