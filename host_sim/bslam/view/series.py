@@ -98,7 +98,8 @@ def draw_nees(axes: Any, series: Series) -> None:
         window = max(1, round(_SMOOTH_S / float(np.median(np.diff(series.time_s)))))
         label = f"{_SMOOTH_S:g} s mean; over all {mean[known].mean():.2f}"
         axes.plot(series.time_s, moving_mean(mean, window), color=ESTIMATE, linewidth=1.8, label=label)
-        least, most = max(0.01, 0.7 * float(mean[known].min())), max(20.0, 1.5 * float(mean[known].max()))
+        least, most = min(low, float(mean[known].min())), max(high, float(mean[known].max()))
+        least, most = max(0.01, 0.7 * least), max(20.0, 1.5 * most)
         axes.set_ylim(least, most * (most / least) ** _NEES_TOP)
     axes.set_yscale("log")
     axes.set_xlim(float(series.time_s[0]), float(series.time_s[-1]))

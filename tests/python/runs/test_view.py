@@ -1,6 +1,7 @@
 """Pictures: they are drawn from whatever a run leaves, and are PNG."""
 
 import io
+from dataclasses import replace
 
 import matplotlib.image
 import numpy as np
@@ -85,10 +86,13 @@ def test_a_short_run_is_halved_for_the_means_at_its_ends():
 
 
 def test_legend_of_nees_lies_above_the_curve():
-    figure = draw_run(series())
+    overconfident = series()
+    figure = draw_run(replace(overconfident, nees=1000.0 + overconfident.nees))
     pixels(figure)
     axes = figure.axes[1]
     legend = axes.get_legend().get_window_extent().transformed(axes.transData.inverted())
+    low, high = axes.get_ylim()
+    assert low < 0.2 < 9.3 < high  # the band is shown, whatever the NEES
     assert legend.y0 > max(np.nanmax(line.get_ydata()) for line in axes.get_lines())
 
 
