@@ -32,6 +32,12 @@ def test_help_promised_target_is_listed(listed: set[str], target: str) -> None:
     assert target in listed
 
 
+def test_run_says_beforehand_what_may_fail() -> None:
+    lines = make("--dry-run", "run").stdout.splitlines()
+    said = next(number for number, line in enumerate(lines) if "may map" in line)
+    assert "FAILED by map" in lines[said + 1] and "detect run" in lines[said + 2]
+
+
 def test_firmware_unknown_target_names_the_allowed_ones() -> None:
     result = make("firmware", "TARGET=avr")
     assert result.returncode == 2
