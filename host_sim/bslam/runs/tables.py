@@ -124,10 +124,12 @@ def markdown(
     lines = [f"# {heading}", ""]
     lines += [
         "Position error, estimated against true position at every step, in cm: means over the runs of each",
-        "run's figure; the paper shows one run. NEES of the pose: 3 is consistent; the band holds 95 % of a",
-        "consistent filter's NEES averaged over the runs at one step.",
+        "run's figure. NEES of the pose: 3 is consistent; the band holds 95 % of a consistent filter's NEES",
+        "averaged over the runs at one step.",
         "",
     ]
+    if any(cell.paper_cm for cell in cells):
+        lines += ["The paper shows one run a cell.", ""]
     if room_picture is not None:
         lines += ["## The room", "", f"![room]({room_picture})", ""]
     for sigma_mps in sorted({cell.sigma_mps for cell in cells}):

@@ -282,7 +282,8 @@ def test_tables_of_another_room_are_not_the_paper_s(tmp_path, capsys):
     text, said = (tmp_path / "tables.md").read_text(), capsys.readouterr().out
     assert text.startswith("# Tables of pairs: association both, 1 run a cell")
     assert "## sigma 1 m/s" in text and "| cm | Distance observation: invariant filter |" in text
-    assert "best to worst" not in text and said.startswith("cm, both  ") and "below 7.815" in said
+    assert "best to worst" not in text and "paper" not in text
+    assert said.startswith("cm, both  ") and "below 7.815" in said
     (cell,) = json.loads((tmp_path / "tables.json").read_text())["cells"]
     assert cell["scenario"] == "pairs" and "paper_cm" not in cell
 
