@@ -60,8 +60,9 @@ _FIGURE3_SEED: Final = 2
 _WORDS: Final = (
     "Errors are distances of the estimated from the true position. What follows a plus-minus is half of the "
     "95 % interval of a mean over runs, from five runs on. NEES is that of the pose: 3 is consistent. Lost "
-    "means: the error was above 2 m in the last 1000 steps, or not finite. Failed means: lost; or off, for 5 s above 1 m and 3 times known association's "
-    "error; or the map is not one to one; or NEES is above 20 over the last 50 s."
+    "means: the error was above 2 m in the last 1000 steps, or not finite. Failed means: lost; or off, for "
+    "5 s above 1 m and 3 times known association's error; or the map is not one to one; or NEES is above 20 "
+    "over the last 50 s."
 )
 
 
