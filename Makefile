@@ -70,8 +70,8 @@ OWN_THINGS := firmware/models/own_room.json
 run: setup-run ## the main job: the paper's room, by sightings and by images, then a real log if at hand
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
 	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --out out/run_camera
-	@echo "make run: now five things of the room, by a detector that learned them from drawn pictures: it may map" \
-	    "one false beacon, and the verdict then says FAILED by map"
+	@echo "make run: now five things of the room, by a detector that learned them from drawn pictures: it may" \
+	    "map one false beacon, and the verdict then says FAILED by map"
 	$(BSLAM) detect run paper_room --model $(OWN_THINGS) --out out/run_own_things
 	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --model $(OWN_THINGS) --sigma 0.05 \
 	    --out out/run_own_things

@@ -8,7 +8,7 @@ SITE_NOTEBOOKS := build/site/notebooks
 PLAYGROUND_HTML := out/playground/index.html
 
 .PHONY: site
-site: setup $(SITE_STAMP) playground ## documents, headers, notebooks, pictures, playground as a site: out/site
+site: setup $(SITE_STAMP) playground ## documents, headers, notebooks, playground as a site: out/site
 	@$(PYTHON) notebooks/run.py $(SITE_NOTEBOOKS)
 	@$(SITE_VENV)/bin/python -m tools.site_pages $(SITE_PAGES) $(SITE_NOTEBOOKS)
 	@test ! -f $(PLAYGROUND_HTML) || install -D $(PLAYGROUND_HTML) $(SITE_PAGES)/playground/index.html

@@ -66,26 +66,41 @@ def verdict(entries: Sequence[Mapping[str, Any]]) -> str:
 
     Right is what a truth was held against; and not where most of the log was left unused.
     """
-    failed = [one for one in entries if one.get("failed", one["diverged"])]
-    ran = [one for one in entries if not one.get("failed", one["diverged"])]
-    judged = [one for one in ran if "position_error_m" in one or "map_one_to_one" in one]
-    doubted = [one for one in ran if one.get("problems")]
-    right = [one for one in judged if not one.get("problems")]
-    none_told = bool(ran) and not judged
-    said = f"{len(ran) if none_told else len(right)} of {len(entries)} {'ran' if none_told else 'right'}"
+    kinds: dict[str, list[Mapping[str, Any]]] = {"failed": [], "in doubt": [], "untold": [], "right": []}
+    for one in entries:
+        kinds[_kind(one)].append(one)
+    failed, doubted, untold, right = kinds.values()
+    none_told = len(untold) > 0 and not right
+    said = f"{len(untold if none_told else right)} of {len(entries)} {'ran' if none_told else 'right'}"
     if failed:
-        by = Counter(reason for one in failed for reason in one.get("failed_by", ["error"]))
-        said += f", {len(failed)} FAILED by {', '.join(f'{one} ({by[one]})' for one in by)}: {_names(failed)}"
+        said += f", {len(failed)} FAILED by {_reasons(failed)}: {_names(failed)}"
     if doubted:
         said += f", {len(doubted)} in doubt: {_names(doubted)}"
-    if len(judged) < len(ran):
-        whose = "" if none_told else f" of {len(ran) - len(judged)}"
-        said += f"; no truth tells{whose} whether it is right"
+    if untold:
+        said += f"; no truth tells{'' if none_told else f' of {len(untold)}'} whether it is right"
+    return said + _worst(entries)
+
+
+def _kind(entry: Mapping[str, Any]) -> str:
+    if entry.get("failed", entry["diverged"]):
+        return "failed"
+    if entry.get("problems"):
+        return "in doubt"
+    return "right" if "position_error_m" in entry or "map_one_to_one" in entry else "untold"
+
+
+def _reasons(failed: Sequence[Mapping[str, Any]]) -> str:
+    by = Counter(reason for one in failed for reason in one.get("failed_by", ["error"]))
+    return ", ".join(f"{one} ({by[one]})" for one in by)
+
+
+def _worst(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The largest mean error, and whose it is; nothing where no error is known."""
     scored = [one for one in entries if "position_error_m" in one]
     if not scored:
-        return said
+        return ""
     worst = max(scored, key=lambda one: one["position_error_m"]["mean"])
-    return f"{said}; worst mean error {100.0 * worst['position_error_m']['mean']:.1f} cm, {worst['name']}"
+    return f"; worst mean error {100.0 * worst['position_error_m']['mean']:.1f} cm, {worst['name']}"
 
 
 def _names(entries: Sequence[Mapping[str, Any]]) -> str:
