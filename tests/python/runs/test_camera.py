@@ -18,6 +18,7 @@ from bslam.runs.camera import Aim, CameraStore, camera_log, covering_beacon, uns
 from bslam.runs.eye import Eye
 from bslam.runs.runner import run_log
 from bslam.scannerfile import read_scanner
+from bslam.world.camera import Renderer
 from bslam.world.simulate import load_scenario, simulate, true_drive
 
 RIG = load_rig("three60")
@@ -83,8 +84,8 @@ def test_cameras_see_people_where_they_are_at_that_step(short, monkeypatch):
         places.append(movers_m)
         return rendered(self, pose, time_s, pan_rad, movers_m)
 
-    rendered = camera.Renderer.render
-    monkeypatch.setattr(camera.Renderer, "render", render)
+    rendered = Renderer.render
+    monkeypatch.setattr(Renderer, "render", render)
     _, glances = unseen_log(hall, 1, None, None, RIG, camera.TOLD_THRESHOLD)
     for _ in zip(glances, range(50), strict=False):
         continue

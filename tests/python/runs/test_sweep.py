@@ -172,9 +172,10 @@ def test_sweep_goes_on_past_a_run_that_fails_and_tries_it_again(
 ) -> None:
     out = tmp_path / "out"
     good = sweep.read_text()
-    sweep.write_text(good.replace("[9.0, 16.0]", "[9.0, -1.0]"))  # no gate can be below 0
+    bad = good.replace("set.gate_d2 = [9.0, 16.0]", "set.scale_states = [0, 1]")  # not beside velocity states
+    sweep.write_text(bad)
     assert sweep_into(out, sweep) == 2
-    assert "gate_d2 = -1.0: allowed is" in last_line(capsys)
+    assert "scale_states" in last_line(capsys)
     failed = [run for run in runs(out) if "error" in run]
     assert len(runs(out)) == 8 and len(failed) == 4 and all(run["diverged"] for run in failed)
     assert kill_sweep.kept(out) == 4
