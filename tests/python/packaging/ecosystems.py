@@ -57,7 +57,7 @@ def run(*command: object, folder: Path, **words: str) -> str:
 
 def unpacked(archive: Path, folder: Path) -> Path:
     folder.mkdir()
-    shutil.unpack_archive(archive, folder, **({} if archive.suffix == ".zip" else {"filter": "data"}))
+    shutil.unpack_archive(archive, folder)
     return folder
 
 
