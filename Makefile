@@ -94,7 +94,7 @@ train: setup ## train the beacon detectors on rendered worlds, write firmware/mo
 # --- Testing ------------------------------------------------------------------------------------------------
 
 # Two halves of about the same length, one for each core, and the longest first: the rest goes beside them.
-PYTEST_HALF := tests/python/runs tests/python/target tests/python/tools
+PYTEST_HALF := tests/python/runs tests/python/target tests/python/tools tests/python/packaging
 
 .PHONY: test pytest pytest-half pytest-rest
 test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak, firmware in QEMU, pytest

@@ -14,7 +14,7 @@ SOURCES = [
     UNIT / "plain_settings.c",
     *(path for name in ("base", "bslam") for path in sorted((ROOT / "firmware" / name).rglob("*.c"))),
 ]
-FLAGS = ["-std=c11", "-ffp-contract=off", "-O1", "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter"]
+FLAGS = ["-std=c11", "-ffp-contract=off", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter"]
 ALL = {"BSLAM_APPEARANCE": 1, "BSLAM_SMOOTHER": 1, "BSLAM_GUARD": 2}
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
