@@ -127,9 +127,9 @@ def _robot_keys(arguments: argparse.Namespace) -> dict[str, Any]:
             raise BslamError(f"--set {text!r}: allowed: KEY=VALUE, as wheel_speed_sigma_mps=0.02")
     if arguments.wheelbase is not None:
         keys["wheelbase_m"] = WHEELBASE_M.convert(arguments.wheelbase, "--wheelbase")
-    placeholder = dict.fromkeys(("wheelbase_m", "step_us", "range_sigma_scale_m"), 1)
+    required = dict.fromkeys(("wheelbase_m", "step_us", "range_sigma_scale_m"), 1)  # the bag will say
     noise = ("wheel_speed_sigma_mps", "field_of_view_rad", "bearing_sigma_rad", "range_sigma_fraction")
-    parse_table(Robot, {**placeholder, **dict.fromkeys(noise, 1.0), **keys}, "--set")
+    parse_table(Robot, {**required, **dict.fromkeys(noise, 1.0), **keys}, "--set")
     return keys
 
 

@@ -6,6 +6,7 @@ import statistics
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import filterfalse
 from pathlib import Path
 from typing import Any
 
@@ -66,27 +67,34 @@ def verdict(entries: Sequence[Mapping[str, Any]]) -> str:
 
     Right is what a truth was held against; and not where most of the log was left unused.
     """
-    kinds: dict[str, list[Mapping[str, Any]]] = {"failed": [], "in doubt": [], "untold": [], "right": []}
-    for one in entries:
-        kinds[_kind(one)].append(one)
-    failed, doubted, untold, right = kinds.values()
-    none_told = len(untold) > 0 and not right
-    said = f"{len(untold if none_told else right)} of {len(entries)} {'ran' if none_told else 'right'}"
+    failed, ran = [*filter(_has_failed, entries)], [*filterfalse(_has_failed, entries)]
+    doubted, told = [*filter(_is_doubted, ran)], [*filter(_is_told, ran)]
+    none_told = bool(ran) and not told
+    if none_told:
+        said = f"{len(ran)} of {len(entries)} ran"
+    else:
+        said = f"{len([*filterfalse(_is_doubted, told)])} of {len(entries)} right"
     if failed:
         said += f", {len(failed)} FAILED by {_reasons(failed)}: {_names(failed)}"
     if doubted:
         said += f", {len(doubted)} in doubt: {_names(doubted)}"
-    if untold:
-        said += f"; no truth tells{'' if none_told else f' of {len(untold)}'} whether it is right"
+    if len(told) < len(ran):
+        whose = "" if none_told else f" of {len(ran) - len(told)}"
+        said += f"; no truth tells{whose} whether it is right"
     return said + _worst(entries)
 
 
-def _kind(entry: Mapping[str, Any]) -> str:
-    if entry.get("failed", entry["diverged"]):
-        return "failed"
-    if entry.get("problems"):
-        return "in doubt"
-    return "right" if "position_error_m" in entry or "map_one_to_one" in entry else "untold"
+def _has_failed(entry: Mapping[str, Any]) -> bool:
+    return bool(entry.get("failed", entry["diverged"]))
+
+
+def _is_doubted(entry: Mapping[str, Any]) -> bool:
+    return bool(entry.get("problems"))
+
+
+def _is_told(entry: Mapping[str, Any]) -> bool:
+    """Whether a truth was held against it."""
+    return "position_error_m" in entry or "map_one_to_one" in entry
 
 
 def _reasons(failed: Sequence[Mapping[str, Any]]) -> str:

@@ -114,4 +114,4 @@ def test_verdict_says_how_many_by_what_and_the_worst(
     )
     unused = {"problems": ["most of the log was not used"]}
     assert verdict([good | unused]) == "0 of 1 right, 1 in doubt: a; worst mean error 5.0 cm, a"
-    assert verdict([untold | unused]) == "0 of 1 right, 1 in doubt: d"
+    assert verdict([untold | unused]) == "1 of 1 ran, 1 in doubt: d; no truth tells whether it is right"
