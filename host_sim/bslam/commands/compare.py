@@ -46,6 +46,7 @@ causal MAP, the bound), isam2 (GTSAM), mrpt.
 The table's ratio is to the map at the steps at which that is solved. compare.json has the table, summary.json
 the runs, compare.png the errors over time."""
 
+PICTURE = "compare.png"
 TOLD = (BOUND, "isam2")
 """Those that cannot do without identities."""
 
@@ -172,10 +173,12 @@ def _write(
         "versions": _versions(methods),
     }
     write_json(out / "compare.json", {"schema": 1, **about, "methods": list(lines), **more})
+    picture = out / PICTURE
+    picture.unlink(missing_ok=True)  # of an earlier run
     if arguments.pictures > 0 and (shown := _contenders(result, methods, arguments.map_every)):
         drives = len(arguments.seeds)
         title = f"{Path(arguments.scenario).stem}, {f'mean of {drives} drives' if drives > 1 else '1 drive'}"
-        write_atomically(out / "compare.png", png(draw_comparison(title, shown)))
+        write_atomically(picture, png(draw_comparison(title, shown)))
 
 
 def _versions(methods: Sequence[Method]) -> dict[str, str]:
@@ -191,7 +194,9 @@ def _contenders(result: ContestResult, methods: Sequence[Method], every: int) ->
         if len({len(one.error_m) for one in runs}) == 1:
             rows = slice(None, None, every if method.name == BOUND else 1)
             errors = np.array([one.error_m[rows] for one in runs])
-            shown.append(Contender(method.name, runs[0].time_s[rows], errors, dashed=method.name == BOUND))
+            if np.isfinite(errors[:, 1:]).any():
+                dashed = method.name == BOUND
+                shown.append(Contender(method.name, runs[0].time_s[rows], errors, dashed))
     return shown
 
 
@@ -213,9 +218,8 @@ def _say(
     told = [line["method"] for line in lines if line["method"] in TOLD]
     if options.association != "known" and told:
         print(f"association {options.association}: {' and '.join(told)}: given the identities")
-    print(
-        f"files in {arguments.out}: compare.json, compare.png, summary.json, NAME.estimate.tum, NAME.map.csv"
-    )
+    picture = f"{PICTURE}, " if (arguments.out / PICTURE).is_file() else ""
+    print(f"files in {arguments.out}: compare.json, {picture}summary.json, NAME.estimate.tum, NAME.map.csv")
     _say_failures(result)
     return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
 

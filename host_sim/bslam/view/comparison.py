@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bslam.view.style import moving_mean, new_figure, tidy
+from bslam.view.style import mean_over_runs, moving_mean, new_figure, tidy
 
 _COLOURS: Final = ("#1f6fb4", "#999999", "#222222", "#4c9f70", "#d1495b", "#8d5fb8", "#e08a1e", "#17a2a2")
 _SMOOTH_S: Final = 2.0
@@ -31,7 +31,7 @@ def draw_comparison(title: str, contenders: Sequence[Contender]) -> Figure:
     figure = new_figure(9.5, 5.0)
     axes = figure.subplots()
     for number, one in enumerate(contenders):
-        error_cm = 100.0 * np.nanmean(one.error_m[:, 1:], axis=0)
+        error_cm = 100.0 * mean_over_runs(one.error_m[:, 1:])
         colour, label = _COLOURS[number % len(_COLOURS)], f"{one.name}: {np.nanmean(error_cm):.1f} cm"
         step_s = float(np.median(np.diff(one.time_s)))
         shown = moving_mean(error_cm, max(1, round(_SMOOTH_S / step_s)))

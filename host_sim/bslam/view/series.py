@@ -10,7 +10,17 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bslam.view.style import BAND, ESTIMATE, SECOND, TRUTH, moving_mean, new_figure, thinned, tidy
+from bslam.view.style import (
+    BAND,
+    ESTIMATE,
+    SECOND,
+    TRUTH,
+    mean_over_runs,
+    moving_mean,
+    new_figure,
+    thinned,
+    tidy,
+)
 
 _SMOOTH_S: Final = 5.0
 _PAGE_IN: Final = 9.6
@@ -74,7 +84,7 @@ def draw_error(axes: Any, series: Series) -> None:
     style = {"linestyle": "", "marker": ".", "markersize": 3} if sparse else {"linewidth": 0.9}
     colour, label = (TRUTH, "first run") if several else (ESTIMATE, "position error")
     axes.plot(time_s, error_cm[0], color=colour, alpha=0.8, label=label, **style)
-    mean_cm = _mean_over_runs(error_cm)
+    mean_cm = mean_over_runs(error_cm)
     if several:
         axes.plot(time_s, mean_cm, color=ESTIMATE, linewidth=1.6, label=f"mean of {len(error_cm)} runs")
     window_s = min(series.window_s, 0.5 * float(time_s[-1] - time_s[0]))
@@ -91,7 +101,7 @@ def draw_nees(axes: Any, series: Series) -> None:
     low, high = series.nees_band
     axes.axhspan(low, high, color=BAND, alpha=0.15, linewidth=0, label=f"95 % band, {low:.2g} to {high:.2g}")
     axes.axhline(3.0, color=BAND, linewidth=1.2, label="consistent: 3")
-    mean = _mean_over_runs(series.nees)
+    mean = mean_over_runs(series.nees)
     known = np.isfinite(mean)
     if known.any():
         axes.plot(thinned(series.time_s), thinned(mean), color=ESTIMATE, linewidth=0.6, alpha=0.55)
@@ -119,15 +129,8 @@ def _draw_window(
 
 def _highest_cm(series: Series) -> float:
     """Greatest error worth showing: of the first run and of the mean, not of the worst run of many."""
-    shown_cm = 100.0 * np.stack([series.error_m[0], _mean_over_runs(series.error_m)])
+    shown_cm = 100.0 * np.stack([series.error_m[0], mean_over_runs(series.error_m)])
     return max(float(np.max(shown_cm[np.isfinite(shown_cm)], initial=0.0)), 1.0)
-
-
-def _mean_over_runs(values: NDArray[Any]) -> NDArray[np.float64]:
-    """(runs, n) -> (n,), over the finite ones; NaN where there are none."""
-    finite = np.isfinite(values)
-    total = np.sum(np.where(finite, values, 0.0), axis=0)
-    return np.where(finite.any(axis=0), total / np.maximum(finite.sum(axis=0), 1), np.nan)
 
 
 def _draw_spread(axes: Any, time_s: NDArray[Any], error_cm: NDArray[Any]) -> None:

@@ -73,3 +73,10 @@ def moving_mean(values: NDArray[np.float64], window: int) -> NDArray[np.float64]
     total = np.convolve(np.where(finite, values, 0.0), kernel, mode="same")
     count = np.convolve(finite.astype(np.float64), kernel, mode="same")
     return np.where(count > 0.5, total / np.maximum(count, 1.0), np.nan)
+
+
+def mean_over_runs(values: NDArray[Any]) -> NDArray[np.float64]:
+    """(runs, n) -> (n,), over the finite ones; NaN where there are none."""
+    finite = np.isfinite(values)
+    total = np.sum(np.where(finite, values, 0.0), axis=0)
+    return np.where(finite.any(axis=0), total / np.maximum(finite.sum(axis=0), 1), np.nan)

@@ -93,6 +93,24 @@ def test_all_well_exits_0(scene, capsys):
     assert capsys.readouterr().out.splitlines()[1].startswith("dead_reckoning")
 
 
+def test_picture_is_of_what_has_an_error_and_named_only_where_it_is(scene, made, capsys, recwarn):
+    log = made.circle_log(40, seed=1)
+    truth = replace(log.truth, **{name: one[::10] for name, one in vars(log.truth).items()})
+    replace(log, truth=truth).write(scene / "sparse")
+    replace(log, truth=None).write(scene / "mapped")
+    words = ["--only", "dead_reckoning,map", "--association", "known", "--map-every", "1000", "--out", "out"]
+    for drive, more, is_drawn in (
+        ("sparse", [], True),
+        ("mapped", [], False),
+        ("drive", [], True),
+        ("drive", ["--pictures", "0"], False),
+    ):
+        assert main(["compare", drive, *words, *more]) == 0
+        assert ("compare.png" in capsys.readouterr().out) == is_drawn
+        assert (scene / "out" / "compare.png").is_file() == is_drawn
+    assert not [one for one in recwarn if issubclass(one.category, RuntimeWarning)]
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
