@@ -21,6 +21,6 @@ def draw_picture(picture: Picture, title: str) -> Figure:
         style = {} if curve.is_line else points
         axes.plot(thinned(curve.x), thinned(curve.y), color=colour, label=curve.label, **style)
     tidy(axes, picture.x_label, picture.y_label)
-    axes.set_title(title, fontsize=9, wrap=True)
+    axes.set_title(title, fontsize=9, wrap=True, parse_math=False)
     axes.legend(frameon=False, fontsize=8)
     return figure

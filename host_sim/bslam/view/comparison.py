@@ -38,7 +38,7 @@ def draw_comparison(title: str, contenders: Sequence[Contender]) -> Figure:
         style = {"linestyle": "--", "linewidth": 1.6} if one.dashed else {"linewidth": 1.4}
         axes.plot(one.time_s[1:], shown, color=colour, label=label, **style)
     axes.set_yscale("log")
-    axes.set_title(title, fontsize=11)
+    axes.set_title(title, fontsize=11, parse_math=False)
     tidy(axes, "time, s", "position error, cm")
     axes.legend(fontsize=8, frameon=False, ncols=2)
     return figure

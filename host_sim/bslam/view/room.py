@@ -77,7 +77,7 @@ def draw_room_in(axes: Any, room: Room) -> None:
     axes.set_xlim(low_m[0], high_m[0])
     axes.set_ylim(low_m[1], high_m[1])
     tidy(axes, "x, m", "y, m")
-    axes.set_title(room.title, fontsize=11)
+    axes.set_title(room.title, fontsize=11, parse_math=False)
 
 
 def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:

@@ -53,7 +53,7 @@ def draw_run_in(error_axes: Any, nees_axes: Any, series: Series) -> None:
     draw_error(error_axes, series)
     draw_nees(nees_axes, series)
     error_axes.set_xlabel("")
-    error_axes.set_title(series.title, fontsize=11)
+    error_axes.set_title(series.title, fontsize=11, parse_math=False)
 
 
 def draw_cells(title: str, cells: Sequence[Series]) -> Figure:

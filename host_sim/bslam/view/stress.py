@@ -43,7 +43,7 @@ def draw_stress(title: str, lines: Sequence[Line]) -> Figure:
     lost.set_xlim(-5.0, 105.0)
     errors.set_yticks(range(len(lines)), [line.label for line in lines], fontsize=8)
     errors.set_ylim(len(lines) - 0.5, -0.5)
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(title, fontsize=11, parse_math=False)
     return figure
 
 

@@ -59,7 +59,7 @@ def draw_world(world: World) -> Figure:
     axes.set_aspect("equal")
     axes.set_xlim(low_m[0], high_m[0])
     axes.set_ylim(low_m[1], high_m[1])
-    axes.set_title(world.title, fontsize=10)
+    axes.set_title(world.title, fontsize=10, parse_math=False)
     tidy(axes, "x, m", "y, m")
     figure.legend(loc="outside lower center", ncols=5, fontsize=7, frameon=False)
     return figure

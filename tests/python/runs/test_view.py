@@ -7,8 +7,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from bslam.view.comparison import Contender, draw_comparison
 from bslam.view.room import Mapped, Room, draw_room
 from bslam.view.series import Series, draw_cells, draw_run
+from bslam.view.stress import Line, draw_stress
 from bslam.view.style import moving_mean, png, thinned
 
 PATH = np.column_stack([np.linspace(0, 5, 200), np.sin(np.linspace(0, 5, 200))])
@@ -109,6 +111,18 @@ def test_a_run_without_a_single_figure_is_drawn_all_the_same():
         "none", 0.04 * np.arange(100), np.full((1, 100), np.nan), np.full((1, 100), np.nan), (0.2, 9.3), 50.0
     )
     pixels(draw_run(empty))
+
+
+def test_titles_are_names_and_no_formulas():
+    name = r"a $\frac$"
+    many = [Contender("one", 0.04 * np.arange(100), np.ones((1, 100)))]
+    for figure in (
+        draw_room(Room(name, PATH)),
+        draw_run(replace(series(), title=name)),
+        draw_comparison(name, many),
+        draw_stress(name, [Line("row", [1.0], [3.0], 0.0, (0.0, 0.5))]),
+    ):
+        assert png(figure).startswith(b"\x89PNG")
 
 
 def test_moving_mean_leaves_out_what_is_not_known():
