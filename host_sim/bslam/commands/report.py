@@ -46,8 +46,7 @@ def finish(
     """
     print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
     entries = [outcome.entry for outcome in result.outcomes]
-    if entries:
-        print(f"verdict: {verdict(entries)}")
+    print(f"verdict: {verdict(entries)}")
     _say_each("presets", [", ".join(entry.get("presets", ())) for entry in entries])
     _say_each("align", [entry.get("align", "") for entry in entries])
     print(f"files in {out}: {', '.join(_files(result, more))}")
@@ -67,6 +66,8 @@ def verdict(entries: Sequence[Mapping[str, Any]]) -> str:
 
     Right is what a truth was held against; and not where most of the log was left unused.
     """
+    if not entries:
+        return "nothing ran"
     failed, ran = [*filter(_has_failed, entries)], [*filterfalse(_has_failed, entries)]
     doubted, told = [*filter(_is_doubted, ran)], [*filter(_is_told, ran)]
     none_told = bool(ran) and not told

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import datetime
 import importlib.metadata
+import itertools
 import platform
 import shlex
 import statistics
@@ -57,6 +58,7 @@ figure3: a map made by a distance threshold and one made by looks; association: 
 real: the MRCLAM logs, where they are at hand."""
 REAL_SETS: Final = ("MRCLAM_Dataset1", "MRCLAM_Dataset2", "MRCLAM_Dataset6")
 _FIGURE3_SEED: Final = 2
+_STOPPED: Final = "Stopped: this page lacks what was not finished then."
 _WORDS: Final = (
     "Errors are distances of the estimated from the true position. What follows a plus-minus is half of the "
     "95 % interval of a mean over runs, from five runs on. NEES is that of the pose: 3 is consistent. Lost "
@@ -111,7 +113,8 @@ def execute(arguments: argparse.Namespace) -> int:
         if maker.interrupted:
             break
     path = arguments.out / "report.html"
-    write_atomically(path, render("bslam: what it does", _WORDS, _about(arguments), sections))
+    words = f"{_STOPPED} {_WORDS}" if maker.interrupted else _WORDS
+    write_atomically(path, render("bslam: what it does", words, _about(arguments), sections))
     print(f"files in {arguments.out}: {path.name}, and a folder for each part")
     for line in maker.troubles:
         print(line, file=sys.stderr)
@@ -153,15 +156,19 @@ class _Maker:
         if not error_m or self.interrupted:
             return []
         job = max((one for one in jobs if one.name in error_m), key=lambda one: error_m[one.name])
-        folder = self.out / part / "worst"
-        run_batch([replace(job, draw=draw, files=False)], folder, processes=1)
-        paths = {what: folder / f"{job.name}.{what}.png" for what in ("map", "error")}
+        folder = f"{part}/worst"
+        again = self.run([replace(job, draw=draw, files=False)], folder)
         words = _line(_again(job))
-        return [
-            Picture(path.read_bytes(), f"Worst run, {what}: {words}")
-            for what, path in paths.items()
-            if path.is_file()
+        found = [
+            self.picture(job, again, folder, what, f"Worst run, {what}: {words}") for what in ("map", "error")
         ]
+        return [*itertools.chain.from_iterable(found)]
+
+    def picture(self, job: Job, result: BatchResult, part: str, what: str, caption: str) -> list[Picture]:
+        """What was drawn of a job; none of an earlier report where this time it failed, or was not made."""
+        path = self.out / part / f"{job.name}.{what}.png"
+        is_made = any(one.name == job.name and not one.failed for one in result.outcomes)
+        return [Picture(path.read_bytes(), caption)] if is_made and path.is_file() else []
 
     def note(self, outcomes: Sequence[Any], interrupted: bool) -> None:
         """What the exit status must tell."""
@@ -200,10 +207,9 @@ def _tables(maker: _Maker) -> Section:
     cells, scenario = tables.cells_of(jobs, by_cell), jobs[0].source.name
     sigmas = sorted({cell.sigma_mps for cell in cells})
     pictures = maker.worst(jobs, result, "tables")
-    room = maker.out / "tables" / f"{jobs[0].name}.map.png"
-    if room.is_file():
-        figure = "Figure 6: " if scenario == PAPER_ROOM else ""
-        pictures.append(Picture(room.read_bytes(), f"{figure}path, map and ellipses of {jobs[0].name}"))
+    figure = "Figure 6: " if scenario == PAPER_ROOM else ""
+    caption = f"{figure}path, map and ellipses of {jobs[0].name}"
+    pictures += maker.picture(jobs[0], result, "tables", "map", caption)
     for sigma_mps in sigmas:
         caption = f"{figure_of(scenario, sigma_mps)}error and NEES over time, sigma {sigma_mps:g} m/s"
         pictures.append(Picture(tables.picture(sigma_mps, by_cell), caption))
@@ -262,6 +268,8 @@ def _bound(maker: _Maker) -> Section:
         ]
         _, _, result, lines = compare.compare(maker.parse(compare, words, f"bound/{sigma}"))
         maker.note([outcome for _, outcome in result.outcomes], result.interrupted)
+        if maker.interrupted:
+            break
         commands.append(_line(words))
         own, bound = ({line["method"]: line for line in lines}[name] for name in ("bslam", "map"))
         figures = [_cm(own.get("on_bound_steps_m")), _cm(bound.get("on_bound_steps_m"))]
@@ -291,13 +299,13 @@ def _figure3(maker: _Maker) -> Section:
         part = f"figure3/{method}"
         jobs = run.jobs_of(maker.parse(run, words, part))
         result = maker.run(jobs, part)
+        if maker.interrupted:
+            break
         commands.append(_line(words))
         entries = [one.entry for one in result.outcomes]
         rows.append(_figures(method, entries))
         said.append(f"{method}: {verdict(entries)}")
-        path = maker.out / part / f"{jobs[0].name}.map.png"
-        if path.is_file():
-            pictures.append(Picture(path.read_bytes(), f"Figure 3: {method}"))
+        pictures += maker.picture(jobs[0], result, part, "map", f"Figure 3: {method}")
     what = "The nearest beacon within a threshold makes false beacons round the true ones; looks do not."
     return Section("Figure 3: false beacons", commands, what, [Table(rows)], pictures, ". ".join(said))
 

@@ -10,6 +10,7 @@ from playwright.sync_api import Page, expect
 
 from bslam.cli import main
 from bslam.commands import compare
+from bslam.runs import batch
 from bslam.runs.contest import ContestResult
 from tools.proofs import kill_sweep
 
@@ -70,6 +71,35 @@ def test_report_holds_its_pictures_and_the_figures_of_its_runs(
     expect(
         page.get_by_text("of the UTIAS MRCLAM data are not at hand; BSLAM_DATA names their place")
     ).to_be_visible()
+
+
+def test_report_shows_no_picture_of_before_and_says_that_it_was_stopped(
+    short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["report", "--scenario", str(short), "--seeds", "3:4", "--parts", "tables,figure3"]
+    words += ["--jobs", "1", "--out", str(tmp_path / "out")]
+    make, made = batch._execute, []
+
+    def report(stop_at: int, why: type[BaseException]) -> str:
+        def run(job: batch.Job, out: Path) -> batch.Outcome:
+            made.append(job.name)
+            if len(made) >= stop_at:
+                raise why
+            return make(job, out)
+
+        made.clear()
+        monkeypatch.setattr(batch, "_execute", run)
+        assert main(words) == 1
+        return (tmp_path / "out/report.html").read_text()
+
+    in_worst = report(10, KeyboardInterrupt)
+    assert len(made) == 10
+    assert "Stopped: this page lacks" in in_worst
+    assert "Worst run" not in in_worst and "Figure 6: path" in in_worst
+    nothing = report(1, ValueError)
+    assert "<img" not in nothing and "0 of 9 right, 9 FAILED by error" in nothing
+    assert "Stopped" not in nothing
+    assert "nothing ran" in report(1, KeyboardInterrupt)
 
 
 def test_report_unknown_part_is_named(capsys: pytest.CaptureFixture[str]) -> None:
