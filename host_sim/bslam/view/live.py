@@ -176,6 +176,14 @@ if (frame.data.src.length) document.getElementById("camera").src = frame.data.sr
 requestAnimationFrame(() => { drawn.data = {times: [drawn.data.times[0] + 1]} })
 """
 
+# A connection that was lost (a laptop asleep, a tunnel that broke) takes Bokeh's document with it: the page
+# is loaded anew once there is a server again.
+_ON_LOST: Final = """
+const again = () => fetch(location.href, {cache: "no-store"}).then(() => location.reload(), later)
+const later = () => setTimeout(again, 1000)
+again()
+"""
+
 
 _Line = tuple[NDArray[np.float64], str, float, float, str]
 """Points (n, 2) in m, colour, width in px, alpha, dash."""
@@ -234,14 +242,13 @@ class Page:
         self._status.js_on_change("text", CustomJS(args=told, code=_ON_STATUS))
         self._pause = Button(label="Play", button_type="primary", width=80)
         self._step = Button(label="Step", width=80)
-        speed = RadioButtonGroup(labels=list(SPEEDS))
-        if controls.speed in SPEEDS.values():
-            speed.active = list(SPEEDS.values()).index(controls.speed)
+        self._speed = RadioButtonGroup(labels=list(SPEEDS))
+        self._show_speed()
         self._pause.on_click(self._toggle)
         self._step.on_click(controls.step)
-        speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
+        self._speed.on_change("active", lambda _attribute, _old, new: self._set_speed(new))
         room = self._room_plot()
-        parts: dict[str, Any] = {"pause": self._pause, "step": self._step, "speed": speed}
+        parts: dict[str, Any] = {"pause": self._pause, "step": self._step, "speed": self._speed}
         parts |= {"status": self._status, "room": room, "now": self._now_plot(room)}
         parts |= {"error": self._error_plot(), "told": self._told}
         for name, part in parts.items():
@@ -250,11 +257,12 @@ class Page:
         document.template = _TEMPLATE
         document.title = f"bslam: {stage.title}"
         document.add_periodic_callback(self.refresh, _REFRESH_MS)
+        document.js_on_event("connection_lost", CustomJS(code=_ON_LOST))
         self.refresh()
         shown = self._sources["frame"].data["src"]
         x_low, y_low, x_high, y_high = stage.extent_m
         document.template_variables.update(
-            heading=stage.title,
+            heading=html.escape(stage.title),  # Bokeh's templates escape nothing
             help=_HELP,
             paths=_PATHS,
             rays=_RAYS,
@@ -281,6 +289,16 @@ class Page:
             self._controls.pause()
         else:
             self._controls.play()
+
+    def _set_speed(self, active: int | None) -> None:
+        if active is not None and (speed := list(SPEEDS.values())[active]) != self._controls.speed:
+            self._controls.set_speed(speed)
+
+    def _show_speed(self) -> None:
+        """As it was chosen, here, on another page or by --speed, which has others, too."""
+        speeds = list(SPEEDS.values())
+        chosen = self._controls.speed
+        self._speed.active = speeds.index(chosen) if chosen in speeds else None
 
     def _room_plot(self) -> Any:
         """What stays or grows in the plane; as much of it as the walls and the truth take."""
@@ -373,6 +391,7 @@ class Page:
         self._pause.label = "Again" if has_ended else "Pause" if self._controls.playing else "Play"
         self._pause.disabled = moment.state == FAILED
         self._step.disabled = moment.state in (FINISHED, FAILED)
+        self._show_speed()
         if moment.shown is not None:  # before the status, whose change shows it
             self._sources["frame"].data = {"src": [_frame_url(moment.shown)]}
         words = self._words(moment)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, WebSocketRoute, expect
 
 import bslam
 from bslam.cli import main
@@ -203,6 +203,32 @@ def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
         returned, output = command.end()
     assert returned == 1
     assert "stopped at step 1 of 5000" in output
+
+
+def test_live_names_are_texts_and_a_lost_connection_comes_back(
+    page: Page, short: Path, tmp_path: Path
+) -> None:
+    named = short.rename(short.with_name("<i>short.toml"))
+    connections: list[tuple[WebSocketRoute, WebSocketRoute]] = []
+    page.route_web_socket(re.compile(""), lambda one: connections.append((one, one.connect_to_server())))
+    with live(named, "--paused", out=tmp_path / "out") as command:
+        page.goto(command.url)
+        expect(page.get_by_role("heading", name="bslam live: <i>short_seed0: ")).to_be_visible()
+        second = page.context.new_page()
+        second.goto(command.url)
+        chosen = second.locator("button.bk-active")
+        expect(chosen).to_have_text("1")
+        click(page, "16")
+        click(page, "Step")
+        expect(second.get_by_text("paused · step 1 of 60")).to_be_visible()
+        expect(chosen).to_have_text("16")
+        for end in connections[-1]:
+            end.close(code=1001)
+        click(second, "Step")
+        expect(page.get_by_text("paused · step 2 of 60")).to_be_visible()
+        click(page, "Step")
+        expect(second.get_by_text("paused · step 3 of 60")).to_be_visible()
+        command.end()
 
 
 def test_live_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
