@@ -56,7 +56,8 @@ def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     jobs = jobs_of(arguments)
     result = run_batch(jobs, arguments.out, arguments.jobs)
-    if arguments.film is not None and result.ok:
+    made = [] if result.interrupted else [one.name for one in result.outcomes if not one.failed]
+    if arguments.film is not None and jobs[0].name in made:
         _make_film(jobs[0], arguments.film)
     return finish(result, arguments.out)
 

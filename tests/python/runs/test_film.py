@@ -55,6 +55,14 @@ def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path
         assert count(film, pale) > 25
 
 
+def test_film_is_of_the_first_run_whatever_becomes_of_others(short: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "short_seed1.map.csv").mkdir(parents=True)  # which that run cannot replace
+    words = ["run", str(short), "--pictures", "0", "--seeds", "0:2", "--jobs", "1", "--out", str(out)]
+    assert main([*words, "--film", str(tmp_path / "one.webp")]) == 2
+    assert (tmp_path / "one.webp").is_file()
+
+
 def test_film_may_be_webp(short: Path, tmp_path: Path) -> None:
     short.write_text(short.read_text(encoding="utf-8").replace(f"steps = {STEPS}\n", "steps = 2\n"))
     words = ["run", str(short), "--pictures", "0", "--out", str(tmp_path / "out")]
