@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any, Final
 
 import joblib
+import numpy as np
 
 from bslam.commands import compare, replay, run, sweep, tables
 from bslam.commands.arguments import positive_count, seeds_range, whole_number
@@ -28,7 +29,7 @@ from bslam.evaluation.consistency import BELOW_95, half_interval_95
 from bslam.runs.batch import BatchResult, Job, run_batch
 from bslam.runs.output import write_atomically
 from bslam.runs.sources import MrclamSource, ScenarioSource
-from bslam.runs.sweep import code_digest
+from bslam.runs.sweep import beside_known, code_digest, compare_with_known
 from bslam.runs.tables import (
     BEST_TO_WORST,
     PAPER_ROOM,
@@ -317,6 +318,7 @@ def _association(maker: _Maker) -> Section:
     words += [*_seed_words(seeds), "--no-files"]
     jobs, _ = sweep.jobs_and_plan(maker.parse(sweep, words, "association"))
     result = maker.run(jobs, "association")
+    _compare(jobs, result)
     groups: dict[str, list[dict[str, Any]]] = {}
     for outcome in result.outcomes:
         groups.setdefault(outcome.entry["association"], []).append(outcome.entry)
@@ -328,6 +330,16 @@ def _association(maker: _Maker) -> Section:
     said = ". ".join(f"{name}: {verdict(group)}" for name, group in groups.items())
     pictures = maker.worst(jobs, result, "association")
     return Section("Association", [_line(words)], what, [Table(rows)], pictures, said)
+
+
+def _compare(jobs: Sequence[Job], result: BatchResult) -> None:
+    """Judge the runs beside known association, as the command that the page shows does."""
+    made = {one.name: one for one in result.outcomes}
+    for name, known in beside_known(jobs).items():
+        if name in made and known in made:
+            own, other = made[name], made[known]
+            series = [np.stack([one.time_s, one.error_m], dtype=np.float64) for one in (own, other)]
+            compare_with_known(own.entry, other.entry, *series)
 
 
 _HEADS: Final = [

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from bslam.cli import main
-from bslam.commands import compare
+from bslam.commands import compare, report_page
 from bslam.runs import batch
 from bslam.runs.contest import ContestResult
 from tools.proofs import kill_sweep
@@ -100,6 +101,32 @@ def test_report_shows_no_picture_of_before_and_says_that_it_was_stopped(
     assert "<img" not in nothing and "0 of 9 right, 9 FAILED by error" in nothing
     assert "Stopped" not in nothing
     assert "nothing ran" in report(1, KeyboardInterrupt)
+
+
+def test_report_judges_association_beside_known_as_sweep_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    error_m = {"known": 0.5, "svm": 1.2, "joint": 1.8}
+
+    def run(jobs: Sequence[batch.Job], out: Path, processes: int) -> batch.BatchResult:
+        made = []
+        for one in jobs:
+            mean_m = error_m.get(one.options.association, 0.1)
+            reasons = ["off"] if mean_m > 1.0 else []
+            entry = {"name": one.name, "association": one.options.association, "sightings": 1}
+            entry |= dict.fromkeys(("wrong_associations", "missed", "false_new", "deferred"), 0)
+            entry |= {"position_error_m": {"mean": mean_m}, "diverged": False}
+            entry |= {"failed_by": reasons, "failed": bool(reasons)}
+            series = np.arange(100, dtype=np.float32), np.full(100, mean_m, np.float32)
+            made.append(batch.Outcome(one.name, entry, *series))
+        return batch.BatchResult(tuple(made), interrupted=False)
+
+    monkeypatch.setattr(report_page, "run_batch", run)
+    words = ["report", "--parts", "association", "--seeds", "0:1", "--jobs", "1", "--out", str(tmp_path)]
+    assert main(words) == 0
+    page = (tmp_path / "report.html").read_text()
+    assert "svm: 1 of 1 right" in page
+    assert "joint: 0 of 1 right, 1 FAILED by off" in page
 
 
 def test_report_unknown_part_is_named(capsys: pytest.CaptureFixture[str]) -> None:
