@@ -6,6 +6,7 @@ Through narwhals, which speaks to pandas, polars, pyarrow, DuckDB and others, an
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
@@ -19,7 +20,8 @@ from bslam.errors import BslamError
 def texts_of(name: str, frame: Any) -> dict[str, list[str]]:
     """By column the fields of a dataframe; a missing value (None, NaN, NA) is an empty one, True is 1.
 
-    `name` is for messages. Raises BslamError for what is no dataframe, and for a label that is no text.
+    `name` is for messages. Raises BslamError for what is no dataframe, for a label that is no text, and for a
+    value that is several.
     """
     try:
         known = nw.from_native(frame)
@@ -31,12 +33,16 @@ def texts_of(name: str, frame: Any) -> dict[str, list[str]]:
     for column in eager.columns:
         if not isinstance(column, str):  # pandas numbers them where nobody names them
             raise BslamError(f"{name}: column label {column!r} is not allowed; allowed: texts")
-    return {column: _texts(eager[column]) for column in eager.columns}
+    return {column: _texts(name, eager[column]) for column in eager.columns}
 
 
-def _texts(column: nw.Series[Any]) -> list[str]:
-    missing = column.is_null().to_list()
-    return ["" if none else _text(value) for value, none in zip(column.to_list(), missing, strict=True)]
+def _texts(name: str, column: nw.Series[Any]) -> list[str]:
+    values, missing = column.to_list(), column.is_null().to_list()
+    for row, value in enumerate(values):
+        if isinstance(value, Iterable) and not isinstance(value, str):  # bytes, lists: no beacon's name
+            where = f"{name}, row {row}, column {column.name}"
+            raise BslamError(f"{where}: {value!r} is not allowed; allowed: a number, a text, or missing")
+    return ["" if none else _text(value) for value, none in zip(values, missing, strict=True)]
 
 
 def _text(value: Any) -> str:

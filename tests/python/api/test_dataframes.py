@@ -160,6 +160,16 @@ def test_what_is_wrong_is_said_as_of_a_file(table, column, change, allowed, tmp_
             "odometry: column label 0 is not allowed; allowed: texts$",
         ),
         (
+            lambda o, s: Log.from_dataframe(o, s.assign(beacon_id=[b"a"] * len(s)), robot=ROBOT),
+            "sightings, row 0, column beacon_id: b'a' is not allowed; allowed: a number, a text, or missing$",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(
+                o, pl.from_pandas(s.assign(beacon_id=[[1]] * len(s))), robot=ROBOT
+            ),
+            r"sightings, row 0, column beacon_id: \[1\] is not allowed; ",
+        ),
+        (
             lambda o, s: Log.from_dataframe(pd.concat({"a": o}, axis=1), s, robot=ROBOT),
             r"odometry: column label \('a', 'time_us'\) is not allowed; allowed: texts$",
         ),
