@@ -115,6 +115,7 @@ PROOF :=
 
 .PHONY: proof
 proof: setup ## every long proof beside its goal, in a table (90 minutes; goes on if stopped); out/proof
+	@$(MAKE) --no-print-directory lint-c-tidy TIDY_MODE=deep
 	@$(PYTHON) -m tools.proofs.prove $(PROOF)
 
 .PHONY: clean
