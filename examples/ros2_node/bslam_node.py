@@ -18,7 +18,7 @@ from bslam.ros2.geometry import base_on, ellipse_95, frame_over, pose_in, pose_o
 from bslam.ros2.messages import CORNERS, ODOMETRY, camera_of, frames_of, poses_of, transforms_of
 from bslam.ros2.sightings import Markers
 from bslam.ros2.tags import TagSizes
-from bslam.ros2.wheels import arcs, is_jump
+from bslam.ros2.wheels import wheels_between
 
 PARAMETERS = {
     "odometry": "/odom",
@@ -33,7 +33,6 @@ PARAMETERS = {
     "bearing_sd_rad": 0.02,
     "range_sd_fraction": 0.03,
 }
-JUMP_SD = 0.5, 0.5  # m and rad that the pose may be off after odometry was set anew
 FRAMES_PER_MAP = 10
 
 
@@ -81,7 +80,10 @@ class BslamNode(Node):
             if self.last is None:
                 self.slam.sightings(now_us, [], [], [], [])  # an empty frame starts the clock
             else:
-                self.move(now_us, at)
+                left_m, right_m, doubt = wheels_between(self.last, (now_us, at), self.p["wheelbase_m"])
+                if doubt is not None:  # after a pause, or where odometry was set anew, its way is unknown
+                    self.slam.resume_odometry(*doubt)
+                self.slam.odometry("wheels", now_us, left_m, right_m)
         except BslamError as refusal:  # a stamp that runs back, say: the next message covers this one's way
             self.get_logger().warning(str(refusal))
             return
@@ -90,15 +92,6 @@ class BslamNode(Node):
         while self.waiting and self.waiting[0].time_ns // 1000 <= now_us:
             self.see(self.waiting.pop(0), message.header.stamp)
         self.publish(message.header, at)
-
-    def move(self, now_us: int, at: tuple) -> None:
-        before_us, before = self.last
-        way_m, aside_m, turn_rad = (float(one[0]) for one in arcs(np.array([before, at])))
-        if is_jump(way_m, aside_m, (now_us - before_us) * 1e-6):
-            self.slam.resume_odometry(*JUMP_SD)
-            way_m = turn_rad = 0.0
-        half_m = 0.5 * turn_rad * self.p["wheelbase_m"]
-        self.slam.odometry("wheels", now_us, way_m - half_m, way_m + half_m)
 
     def see(self, frame, stamp) -> None:
         camera_pose = pose_in(self.tree, self.p["base_frame"], frame.frame_id)

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Final
+
+PAUSE_US: Final = 4_000_000
+"""A longer pause of odometry interrupts it, as the core has it."""
+_UNSEEN_MPS, _UNSEEN_MOST_M, _UNSEEN_RAD = 0.5, 30.0, 3.0
 
 Pose = tuple[float, float, float]
 """x_m, y_m, theta_rad."""
@@ -21,3 +26,8 @@ def move_on_arc(pose: Pose, left_m: float, right_m: float, wheelbase_m: float) -
     heading_rad = theta_rad + half_turn_rad
     turned_rad = math.remainder(theta_rad + 2.0 * half_turn_rad, math.tau)
     return x_m + chord_m * math.cos(heading_rad), y_m + chord_m * math.sin(heading_rad), turned_rad
+
+
+def unseen_sd(pause_us: int) -> tuple[float, float]:
+    """By how much the pose is doubtful after such a pause, m and rad: the robot may have driven on."""
+    return min(_UNSEEN_MPS * pause_us * 1e-6, _UNSEEN_MOST_M), _UNSEEN_RAD

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.log import Odometry, wrap_rad
+from bslam.motion import PAUSE_US, Pose, unseen_sd
 from bslam.ros2.geometry import Transform, pose_of_part
 from bslam.ros2.messages import PlanarPose, time_ns, turn_rate_of, twist_of
 from bslam.ros2.stamps import in_order, without_repeats
@@ -18,6 +19,8 @@ Floats = NDArray[np.float64]
 
 JUMP_MPS, JUMP_M = 10.0, 1.0
 """An odometry that moves faster, and so far at once, was set anew."""
+JUMP_SD: Final = (0.5, 0.5)
+"""m and rad that the robot's pose may be off then."""
 SIDEWAYS_SHARE = 0.05
 _FIRST_STEPS_MAX = 2
 GYRO_SD_RADPS = 0.02
@@ -117,6 +120,24 @@ def arcs(pose: Floats) -> tuple[Floats, Floats, Floats]:
     aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     chord_over_arc = np.sinc(turn_rad / (2.0 * np.pi))  # sin(half turn) / half turn
     return (step_m * ahead).sum(axis=1) / chord_over_arc, (step_m * aside).sum(axis=1), turn_rad
+
+
+def wheels_between(
+    before: tuple[int, Pose], after: tuple[int, Pose], wheelbase_m: float
+) -> tuple[float, float, tuple[float, float] | None]:
+    """Travel of the left and right wheel, m, between poses of an odometry at their times in us, and None.
+
+    After a pause, or where odometry was set anew, it tells no travel: 0, 0, and by how much, m and rad, that
+    makes the robot's pose doubtful.
+    """
+    dt_us = after[0] - before[0]
+    way_m, aside_m, turn_rad = arcs(np.array([before[1], after[1]]))
+    if dt_us > PAUSE_US:
+        return 0.0, 0.0, unseen_sd(dt_us)
+    if is_jump(way_m, aside_m, np.array([dt_us * 1e-6]))[0]:
+        return 0.0, 0.0, JUMP_SD
+    half_m = 0.5 * wheelbase_m * turn_rad[0]
+    return float(way_m[0] - half_m), float(way_m[0] + half_m), None
 
 
 def is_jump(way_m: Floats, aside_m: Floats, dt_s: Floats) -> NDArray[np.bool_]:

@@ -23,6 +23,7 @@ from bslam.evaluation.ledger import Ledger, corrupt_identities
 from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
+from bslam.motion import PAUSE_US, unseen_sd
 from bslam.options import BY_APPEARANCE, Number, RunOptions, core_params, odometry_lead_us
 from bslam.recording import Recorder, RecordingWriter
 from bslam.recording.aslog import start_of, true_poses
@@ -35,11 +36,6 @@ _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in 
 MAPPABLE, SIGNATURE = 3, 7  # their places among the columns of a frame
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
 FALSE_BEACONS_ROOM = 80
-# After an interruption of odometry (the core takes intervals up to 4 s): the robot may have gone this fast.
-INTERRUPTION_US = 4_000_000
-UNSEEN_SPEED_MPS = 0.5
-UNSEEN_POSITION_SD_MAX_M = 30.0
-UNSEEN_HEADING_SD_RAD = 3.0
 
 
 class Watcher(Protocol):
@@ -207,7 +203,7 @@ class _Run:
         last_us, end_us = times_us[0], times_us[-1]
         for row in rows:
             time_us = row[1]
-            if time_us - last_us > INTERRUPTION_US:
+            if time_us - last_us > PAUSE_US:
                 self._resume(last_us, time_us)
             last_us = time_us
             core_ns = self._read(kind, *row) + self._frames_until(None if time_us == end_us else time_us)
@@ -239,8 +235,7 @@ class _Run:
         No odometry will cover the frames in it: the first may be near enough to the last reading.
         """
         self._feed_frames(next_us - 1)
-        position_sd_m = min(UNSEEN_SPEED_MPS * (next_us - last_us) * 1e-6, UNSEEN_POSITION_SD_MAX_M)
-        self.slam.resume_odometry(*(self.resume_sd or (position_sd_m, UNSEEN_HEADING_SD_RAD)))
+        self.slam.resume_odometry(*(self.resume_sd or unseen_sd(next_us - last_us)))
         self.refusals["interruption"] += 1
 
     def _frames_until(self, until_us: int | None) -> int:

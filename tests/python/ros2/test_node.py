@@ -18,6 +18,7 @@ from ros2.bags import EPOCH_NS, SIDE_M, STORE, Drive, Said, new, parts
 
 NODE = Path(__file__).parents[3] / "examples" / "ros2_node" / "bslam_node.py"
 LINES_MAX = 150
+ARUCO = {"detections": "/aruco_markers", "detections_type": "ros2_aruco_interfaces/msg/ArucoMarkers"}
 
 
 @dataclass
@@ -128,8 +129,7 @@ def test_it_follows_the_robot_by_tags_that_arrive_late(bus: Bus, drive: Drive) -
 
 def test_map_and_transform_agree_with_the_pose(bus: Bus, drive: Drive) -> None:
     said = parts(drive.static(), drive.odometry(), drive.aruco())
-    names = {"detections": "/aruco_markers", "detections_type": "ros2_aruco_interfaces/msg/ArucoMarkers"}
-    drive_node(bus, list(said), **names)
+    drive_node(bus, list(said), **ARUCO)
     assert bus.warnings == []
     assert pose_errors_m(bus, drive).mean() < 0.15
     (over,) = bus.published["/tf"][-1].transforms
@@ -160,6 +160,19 @@ def test_odometry_that_is_set_anew_moves_nothing(bus: Bus, drive: Drive) -> None
     for left_m, right_m in zip(direct.a[:99], direct.b[:99], strict=True):
         at = move_on_arc(at, left_m, right_m, 0.4)
     assert np.hypot(*(places[-1] - at[:2])) < 0.1
+
+
+def test_a_pause_of_odometry_makes_the_pose_doubtful_and_silences_nothing(bus: Bus, drive: Drive) -> None:
+    """It drove on meanwhile, 2 m; the frames of the pause are of no use."""
+    odometry = list(drive.odometry())
+    heard = [*odometry[:200], *odometry[350:]]
+    drive_node(bus, parts(drive.static(), heard, drive.aruco()), **ARUCO)
+    assert len(bus.published["~/pose"]) == len(heard)
+    assert bus.warnings and all(one.startswith("frame at") for one in bus.warnings)
+    sds_m = [math.sqrt(one.pose.covariance[0]) for one in bus.published["~/pose"]]
+    errors_m = pose_errors_m(bus, drive)
+    assert errors_m[200] < 2.0 * sds_m[200] and sds_m[200] > 10.0 * sds_m[199]
+    assert errors_m[-50:].mean() < 0.1
 
 
 def test_what_is_missing_is_said(bus: Bus, drive: Drive) -> None:
@@ -203,8 +216,7 @@ def test_what_is_broken_is_said_and_left_out(bus: Bus, drive: Drive) -> None:
     aruco[0][3].poses.pop()
     for one in (odometry[0], odometry[20]):
         one[3].pose.pose.orientation.z = math.nan
-    names = {"detections": "/aruco_markers", "detections_type": "ros2_aruco_interfaces/msg/ArucoMarkers"}
-    drive_node(bus, [*drive.static(), *odometry, *aruco], **names)
+    drive_node(bus, [*drive.static(), *odometry, *aruco], **ARUCO)
     assert sum("marker_ids and" in one for one in bus.warnings) == 1
     assert sum("its pose is not finite" in one for one in bus.warnings) == 2
     assert len(bus.published["~/pose"]) == 58
