@@ -106,7 +106,7 @@ class BslamNode(Node):
             self.get_logger().warning(str(refusal))
         if self.frames % FRAMES_PER_MAP == 0:
             ellipses = [self.ellipse(one, stamp) for one in self.slam.beacons()]
-            self.map_out.publish(MarkerArray(markers=ellipses))
+            self.map_out.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL), *ellipses]))
         self.frames += 1
 
     def publish(self, header, odometry: tuple) -> None:

@@ -45,7 +45,7 @@ def kind(package: str, name: str) -> Any:
 
     make.full_name = f"{package}/msg/{name}"  # type: ignore[attr-defined]
     if name == "Marker":
-        make.CYLINDER, make.ADD = 3, 0  # type: ignore[attr-defined]
+        make.CYLINDER, make.ADD, make.DELETEALL = 3, 0, 3  # type: ignore[attr-defined]
     return make
 
 
@@ -140,7 +140,8 @@ def test_map_and_transform_agree_with_the_pose(bus: Bus, drive: Drive) -> None:
     shift, pose = over.transform.translation, bus.published["~/pose"][-1].pose.pose.position
     assert pose.x == pytest.approx(shift.x + math.cos(turn) * x_m - math.sin(turn) * y_m)
     assert pose.y == pytest.approx(shift.y + math.sin(turn) * x_m + math.cos(turn) * y_m)
-    markers, beacons = bus.published["~/map"][-1].markers, drive.log.beacons
+    (clear, *markers), beacons = bus.published["~/map"][-1].markers, drive.log.beacons
+    assert clear.action == clear.DELETEALL  # or a beacon that the filter drops would stay
     assert beacons is not None and len(markers) == 6
     for one in markers:
         off_m = np.hypot(beacons.x_m - one.pose.position.x, beacons.y_m - one.pose.position.y).min()
