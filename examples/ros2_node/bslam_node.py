@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from bslam import BslamError, Slam
 from bslam.ros2.geometry import base_on, ellipse_95, frame_over, pose_in, pose_of_part
-from bslam.ros2.messages import CORNERS, ODOMETRY, camera_of, frames_of, poses_of, transforms_of
+from bslam.ros2.messages import CORNERS, ODOMETRY, frames_of, poses_of, transforms_of, usable_camera
 from bslam.ros2.sightings import Markers
 from bslam.ros2.tags import TagSizes
 from bslam.ros2.wheels import wheels_between
@@ -34,6 +34,7 @@ PARAMETERS = {
     "range_sd_fraction": 0.03,
 }
 FRAMES_PER_MAP = 10
+WAITING_MAX = 300  # frames
 
 
 class BslamNode(Node):
@@ -53,7 +54,8 @@ class BslamNode(Node):
         latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.create_subscription(TFMessage, "/tf_static", self.on_static, latched)
         sensors, kind = qos_profile_sensor_data, get_message(p["detections_type"])
-        self.create_subscription(CameraInfo, p["camera_info"], self.on_camera, sensors)
+        if p["detections_type"] in CORNERS:
+            self.create_subscription(CameraInfo, p["camera_info"], self.on_camera, sensors)
         self.create_subscription(Odometry, p["odometry"], self.on_odometry, sensors)
         self.create_subscription(kind, p["detections"], self.on_detections, sensors)
 
@@ -61,13 +63,19 @@ class BslamNode(Node):
         self.tree |= {child: (parent, pose) for parent, child, pose in transforms_of(message)}
 
     def on_camera(self, message) -> None:
-        self.camera = camera_of(message, self.p["rectified"])
+        try:
+            self.camera = usable_camera(message, self.p["camera_info"], self.p["rectified"])
+        except BslamError as refusal:
+            self.get_logger().warning(str(refusal), throttle_duration_sec=5.0)
 
     def on_detections(self, message) -> None:
         try:
             self.waiting += frames_of(self.p["detections_type"], message)  # until odometry covers them
+            if len(self.waiting) > WAITING_MAX:
+                del self.waiting[:-WAITING_MAX]
+                raise BslamError(f"{self.p['odometry']}: silent for {WAITING_MAX} frames; the rest is lost")
         except BslamError as refusal:
-            self.get_logger().warning(str(refusal))
+            self.get_logger().warning(str(refusal), throttle_duration_sec=5.0)
 
     def on_odometry(self, message) -> None:
         (pose,) = poses_of(ODOMETRY, message)
@@ -85,7 +93,7 @@ class BslamNode(Node):
                     self.slam.resume_odometry(*doubt)
                 self.slam.odometry("wheels", now_us, left_m, right_m)
         except BslamError as refusal:  # a stamp that runs back, say: the next message covers this one's way
-            self.get_logger().warning(str(refusal))
+            self.get_logger().warning(str(refusal), throttle_duration_sec=5.0)
             return
         self.last = now_us, at
         self.waiting.sort(key=lambda frame: frame.time_ns)
@@ -94,16 +102,15 @@ class BslamNode(Node):
         self.publish(message.header, at)
 
     def see(self, frame, stamp) -> None:
-        camera_pose = pose_in(self.tree, self.p["base_frame"], frame.frame_id)
-        if camera_pose is None or (self.camera is None and self.p["detections_type"] in CORNERS):
-            missing = "camera_info" if camera_pose else f"way to {frame.frame_id} in /tf_static"
-            self.get_logger().warning(f"frame left out: no {missing} yet", throttle_duration_sec=5.0)
-            return
-        markers = Markers({frame.frame_id: camera_pose}, TagSizes({}, self.p["tag_size_m"]), self.camera, 0.5)
+        pose = pose_in(self.tree, self.p["base_frame"], frame.frame_id)
         try:
+            if pose is None or (self.camera is None and self.p["detections_type"] in CORNERS):
+                missing = "camera_info that can be used" if pose else f"way to {frame.frame_id} in /tf_static"
+                raise BslamError(f"frame left out: no {missing} yet")
+            markers = Markers({frame.frame_id: pose}, TagSizes({}, self.p["tag_size_m"]), self.camera, 0.5)
             self.slam.sightings(frame.time_ns // 1000, **markers.columns(frame, self.words))
         except BslamError as refusal:
-            self.get_logger().warning(str(refusal))
+            self.get_logger().warning(str(refusal), throttle_duration_sec=5.0)
         if self.frames % FRAMES_PER_MAP == 0:
             ellipses = [self.ellipse(one, stamp) for one in self.slam.beacons()]
             self.map_out.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL), *ellipses]))

@@ -16,7 +16,7 @@ from bslam.errors import BslamError
 from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
 from bslam.ros2.bag import Bag
-from bslam.ros2.geometry import DISTORTIONS, Camera, Transform, base_on, pose_in
+from bslam.ros2.geometry import Camera, Transform, base_on, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
     CORNERS,
@@ -32,6 +32,7 @@ from bslam.ros2.messages import (
     frames_of,
     poses_of,
     transforms_of,
+    usable_camera,
 )
 from bslam.ros2.sightings import BEARING_LEFT_RAD, RANGE_LEFT, Markers, sightings_of
 from bslam.ros2.stamps import in_order, without_repeats
@@ -380,26 +381,7 @@ def _camera(read: _Read, request: Request, frames: Sequence[str], needed: bool) 
         raise BslamError(f"corners of several cameras ({', '.join(frames)}); allowed: a topic of one camera")
     if len(names) != 1:
         raise BslamError(f"--camera-info: allowed: one of {', '.join(names) or 'none with messages'}")
-    camera = camera_of(read.cameras[names[0]], bool(request.rectified))
-    _require_usable(camera, names[0], request.rectified)
-    return camera
-
-
-def _require_usable(camera: Camera, topic: str, rectified: bool | None) -> None:
-    if not (camera.fx > 0.0 and camera.fy > 0.0):
-        raise BslamError(f"{topic}: focal lengths {camera.fx:g}, {camera.fy:g}; allowed: a calibrated camera")
-    if not camera.is_distorted:
-        return
-    if rectified is None:
-        raise BslamError(
-            f"{topic}: the camera distorts; allowed: --image rectified, if the detector read image_rect "
-            "(apriltag_ros does), or --image raw"
-        )
-    if camera.model not in DISTORTIONS:
-        raise BslamError(
-            f"{topic}: distortion model {camera.model!r}; allowed: {', '.join(DISTORTIONS[1:])}, or a "
-            "detector on the rectified image and --image rectified"
-        )
+    return usable_camera(read.cameras[names[0]], names[0], request.rectified)
 
 
 def _within(sightings: Sightings, travel: Travel, chosen: _Chosen, notes: list[str]) -> Sightings:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.ros2.geometry import Camera, Transform, yaw_of
+from bslam.ros2.geometry import DISTORTIONS, Camera, Transform, yaw_of
 
 Floats = NDArray[np.float64]
 
@@ -229,6 +229,26 @@ def camera_of(message: Any, rectified: bool) -> Camera:
         return Camera(p[0, 0], p[1, 1], p[0, 2], p[1, 2], size, "", ())
     k = k.reshape(3, 3)
     return Camera(k[0, 0], k[1, 1], k[0, 2], k[1, 2], size, message.distortion_model, tuple(d.tolist()))
+
+
+def usable_camera(message: Any, topic: str, rectified: bool | None) -> Camera:
+    """The same, to turn corners into places; None: nobody says what they are of. Raises BslamError where that
+    cannot be done.
+    """
+    camera = camera_of(message, bool(rectified))
+    if not (camera.fx > 0.0 and camera.fy > 0.0):
+        raise BslamError(f"{topic}: focal lengths {camera.fx:g}, {camera.fy:g}; allowed: a calibrated camera")
+    if camera.is_distorted and rectified is None:
+        raise BslamError(
+            f"{topic}: the camera distorts; allowed: --image rectified, if the detector read image_rect "
+            "(apriltag_ros does), or --image raw"
+        )
+    if camera.is_distorted and camera.model not in DISTORTIONS:
+        raise BslamError(
+            f"{topic}: distortion model {camera.model!r}; allowed: {', '.join(DISTORTIONS[1:])}, or a "
+            "detector on the rectified image, told so"
+        )
+    return camera
 
 
 def turn_rate_of(message: Any) -> tuple[str, Floats, float]:

@@ -4,7 +4,7 @@ import math
 import runpy
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -174,6 +174,23 @@ def test_a_pause_of_odometry_makes_the_pose_doubtful_and_silences_nothing(bus: B
     errors_m = pose_errors_m(bus, drive)
     assert errors_m[200] < 2.0 * sds_m[200] and sds_m[200] > 10.0 * sds_m[199]
     assert errors_m[-50:].mean() < 0.1
+
+
+def test_frames_that_no_odometry_covers_are_not_kept_for_ever(bus: Bus, drive: Drive) -> None:
+    node = drive_node(bus, parts(drive.static(), drive.aruco()), **ARUCO)
+    assert len(list(drive.aruco())) > 300 == len(node.waiting)
+    assert set(bus.warnings) == {"/odom: silent for 300 frames; the rest is lost"}
+
+
+@pytest.mark.parametrize(("model", "focal_px", "said"), [("equidistant", 400.0, "model"), ("", 0.0, "calib")])
+def test_a_camera_that_makes_no_places_of_corners_is_said(
+    bus: Bus, drive: Drive, model: str, focal_px: float, said: str
+) -> None:
+    lens = replace(drive, camera=replace(drive.camera, model=model, fx=focal_px, fy=focal_px))
+    messages = parts(drive.static(), lens.camera_info(), list(drive.odometry())[:60], drive.apriltags())
+    node = drive_node(bus, messages, tag_size_m=SIDE_M, rectified=False)
+    assert said in bus.warnings[0] and "no camera_info that can be used" in bus.warnings[1]
+    assert not node.slam.beacons()
 
 
 def test_what_is_missing_is_said(bus: Bus, drive: Drive) -> None:
