@@ -57,7 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="a key of robot.toml; may be repeated"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="the log folder (default: out/import/BAG)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="the log folder; a log there is replaced (default: out/import/BAG)",
+    )
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -65,8 +70,8 @@ def execute(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("out/import") / arguments.bag.resolve().stem
     _require_place(out)
     imported = import_bag(arguments.bag, _request(arguments))
-    _write(imported.log, out)
-    for line in imported.said:
+    replaced = _write(imported.log, out)
+    for line in (*imported.said, *replaced):
         print(line)
     print(f"log in {out}; next: bslam check {out}; bslam replay csv {out}")
     return 0
@@ -138,8 +143,10 @@ def _require_place(out: Path) -> None:
         raise BslamError(f"--out {out}: there is a file of that name; allowed: a folder")
 
 
-def _write(log: Log, out: Path) -> None:
-    """The log folder, whole or not at all: in a folder that is there, its log files are replaced."""
+def _write(log: Log, out: Path) -> list[str]:
+    """The log folder, whole or not at all: in a folder that is there, its log files are replaced, which the
+    lines returned say.
+    """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
@@ -149,16 +156,28 @@ def _write(log: Log, out: Path) -> None:
             made.chmod(0o755)  # mkdtemp makes it private
             if not out.exists():
                 made.rename(out)
-                return
-            for name in FILES:
-                if (made / name).exists():
-                    os.replace(made / name, out / name)
-                else:
-                    (out / name).unlink(missing_ok=True)
+                return []
+            return _replace(made, out)
         finally:
             shutil.rmtree(made, ignore_errors=True)
     except OSError as error:
         raise BslamError(f"--out {out}: cannot be written: {error}; allowed: a place to write to") from error
+
+
+def _replace(made: Path, out: Path) -> list[str]:
+    """Log files take the place of those in a folder that is there; a line that says which."""
+    there = [name for name in FILES if (out / name).exists()]
+    for name in FILES:
+        if (made / name).exists():
+            os.replace(made / name, out / name)
+        else:
+            (out / name).unlink(missing_ok=True)
+    replaced = ", ".join(name for name in there if (out / name).exists())
+    removed = ", ".join(name for name in there if not (out / name).exists())
+    said = "; ".join(
+        f"{word} {names}" for word, names in (("replaced", replaced), ("removed", removed)) if names
+    )
+    return [f"{out}: {said}"] if said else []
 
 
 def _require_usable(made: Path, out: Path) -> None:

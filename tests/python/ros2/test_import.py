@@ -180,10 +180,16 @@ def test_tags_are_replayed_about_as_well_as_the_direct_log(
     assert replayed_error_m(log) < 1.2 * direct_error_m
 
 
-def test_a_folder_that_is_there_keeps_what_is_no_log(tmp_path: Path, aruco: Path) -> None:
+def test_a_folder_that_is_there_keeps_what_is_no_log(
+    tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "notes.txt").write_text("mine")
+    assert main(["import", "ros2", str(aruco), "--out", str(tmp_path)]) == 0
+    assert "replaced" not in capsys.readouterr().out
     (tmp_path / "beacons.csv").write_text("of another drive")
     assert main(["import", "ros2", str(aruco), "--out", str(tmp_path)]) == 0
+    said = f"{tmp_path}: replaced odometry.csv, sightings.csv, robot.toml; removed beacons.csv\n"
+    assert said in capsys.readouterr().out
     assert sorted(one.name for one in tmp_path.iterdir()) == [
         "notes.txt", "odometry.csv", "robot.toml", "sightings.csv",
     ]  # fmt: skip
