@@ -14,6 +14,7 @@ from bslam.errors import BslamError
 from bslam.log import FILES, WHEEL_RADIUS_M, WHEELBASE_M, Log, Robot
 from bslam.options import RunOptions, core_params
 from bslam.parsing.settings import number, parse_table
+from bslam.ros2.bag import name_of
 from bslam.ros2.importer import Request, import_bag
 from bslam.ros2.tags import HELP, SIDE_M, TagSizes, read_tag_sizes
 
@@ -67,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    out = arguments.out or Path("out/import") / arguments.bag.resolve().stem
+    out = arguments.out or Path("out/import") / name_of(arguments.bag)
     _require_place(out)
     imported = import_bag(arguments.bag, _request(arguments))
     replaced = _write(imported.log, out)

@@ -118,6 +118,12 @@ class Bag:
         return store
 
 
+def name_of(path: Path) -> str:
+    """The name of a bag: a folder's may hold points, as run_1.2 does."""
+    whole = path.resolve()
+    return whole.name if whole.is_dir() else whole.stem
+
+
 def _require_bag(path: Path) -> None:
     allowed = "allowed: a rosbag2 folder (with metadata.yaml), FILE.mcap or FILE.db3"
     if path.suffix == ".bag":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
-from bslam.ros2.bag import Bag
+from bslam.ros2.bag import Bag, name_of
 from bslam.ros2.geometry import Camera, Transform, base_on, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
@@ -143,7 +143,7 @@ def import_bag(path: Path, request: Request) -> Imported:
     robot, guessed = _robot(request, travel, sightings, markers, gyro_said)
     odometry = travel.wheels(robot.wheelbase_m, gyro_radps)
     truth = _truth(read, chosen, travel, notes)
-    log = Log(path.resolve().stem, odometry, sightings, truth, None, robot, words=words)
+    log = Log(name_of(path), odometry, sightings, truth, None, robot, words=words)
     told = _told(read, chosen, kinds, log, markers)
     return Imported(log, (*told, *guessed, *(f"note: {one}" for one in notes)))
 

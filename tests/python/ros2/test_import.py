@@ -358,10 +358,13 @@ def test_odometry_before_a_first_pause_is_left_out(
 def test_a_bag_in_the_present_folder_gives_its_name(
     tmp_path: Path, start: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bag = write_bag(tmp_path / "bag", parts(start.odometry(), start.aruco(), start.static()))
+    bag = write_bag(tmp_path / "bag_1.2", parts(start.odometry(), start.aruco(), start.static()))
     monkeypatch.chdir(bag)
     assert main(["import", "ros2", "."]) == 0
-    Log.read(bag / "out" / "import" / "bag")
+    Log.read(bag / "out" / "import" / "bag_1.2")
+    assert imported(bag).name == "bag_1.2"
+    (file,) = bag.glob("*.mcap")
+    assert imported(file).name == file.stem
 
 
 def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
