@@ -28,6 +28,7 @@ _FREEDOM: Final = 4.0  # degrees of, Student's t
 _ITERATIONS: Final = 8
 _ENOUGH: Final = 1.0  # a smaller gain of log-likelihood is none
 _PROBES: Final = 3
+_CURVATURE_S: Final = 2.0  # of a sum
 # Any odometry may err by so much besides what is told: with the way; with the turn and the way; at rest.
 _WAY_SD_PER_SQRT_M: Final = 0.03
 _TURN_SD_PER_SQRT_RAD: Final = 0.1
@@ -181,11 +182,14 @@ def standard_errors(problem: Problem, state: State, free: Free, told: bool = Fal
     return np.sqrt(np.maximum(np.diag(solver.corner)[-len(free) :], 0.0))
 
 
-def correlation(problem: Problem, state: State, free: Free, one: int, other: int) -> float:
-    """Of the estimates of two free parameters: near 1 or -1 the drive tells them only together."""
-    corner = _Linear(problem, state, free).solver(0.0).corner[-len(free) :, -len(free) :]
-    i, j = free.index(one), free.index(other)
-    return float(corner[i, j] / np.sqrt(corner[i, i] * corner[j, j]))
+def sameness_of_curvature(problem: Problem, state: State) -> float:
+    """How alike way and turn of the fitted path run, from 0 to 1: at 1 each metre turns by the same angle,
+    and a drive tells the parameters TURN and BEND only together. Of sums: noise bends single frames.
+    """
+    steps = relative(state.poses[:-1], state.poses[1:])
+    slot = np.floor(problem.frame_s[1:] / _CURVATURE_S).astype(np.intp)
+    way, turn = (np.bincount(slot - slot[0], steps[:, column]) for column in (0, 2))
+    return float(abs(way @ turn) / np.sqrt((way @ way) * (turn @ turn) + 1e-12))
 
 
 def _to_beacons(problem: Problem, state: State) -> tuple[Floats, Floats]:

@@ -17,12 +17,12 @@ from bslam.logcheck.batch import (
     YAW,
     Problem,
     State,
-    correlation,
     cost,
     errors_at,
     fit,
     minimise,
     problem_of,
+    sameness_of_curvature,
     scatter,
     standard_errors,
 )
@@ -38,7 +38,7 @@ _FAR_D2: Final = 25.0  # that makes a sighting doubtful
 _FAR_KNOWN_D2: Final = 9.0  # once odometry's noise is known
 _DOUBT: Final = 1e3  # by what the noise of a doubtful sighting counts as larger
 _BLOCK_S: Final = 5.0
-_COLLINEAR: Final = 0.95
+_COLLINEAR: Final = 0.9
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
     values = state.parameters[list(_TIMED)].tolist()
     way, turn, bend, yaw = (Estimate(*one) for one in zip(values, errors, covers, strict=True))
     noise, fitted = _noise(problem, state, ~doubtful), references(log, problem, state)
-    has_one_curvature = abs(correlation(problem, state, _TIMED, TURN, BEND)) > _COLLINEAR
+    has_one_curvature = sameness_of_curvature(problem, state) > _COLLINEAR
     return Solution(whole, state, way, turn, bend, yaw, delay, gain, noise, fitted, has_one_curvature)
 
 

@@ -65,8 +65,8 @@ def made_up(
     return Log("made_up", _odometry(kind, time_us, told), sightings, truth, beacons, _robot(kind))
 
 
-def arc(seed: int) -> Log:
-    """A log as it should be: 20 s on one gentle arc past three beacons, by wheels of 1 cm/s of noise."""
+def arc(seed: int, sigma_mps: float) -> Log:
+    """A log as it should be: 20 s on one gentle arc past three beacons, by wheels of that noise."""
     random, steps = np.random.default_rng(seed), np.arange(1, 1001)
     left_m, right_m = 6.0e-3, 6.6e-3
     theta, way_m = (right_m - left_m) / BASE_M * steps, 0.5 * (left_m + right_m) * steps
@@ -79,8 +79,8 @@ def arc(seed: int) -> Log:
     time_us = 20_000 * steps
     mappable = np.ones(600, dtype=bool)
     sightings = Sightings(time_us[rows], label, wrap_rad(bearing), range_m, mappable)
-    told_m = [one + random.normal(0.0, 2e-4, 1000) for one in (left_m, right_m)]
-    noise = {"range_sigma_fraction": 0.01, "range_sigma_floor_m": 0.03, "wheel_speed_sigma_mps": 0.01}
+    told_m = [one + random.normal(0.0, 0.02 * sigma_mps, 1000) for one in (left_m, right_m)]
+    noise = {"range_sigma_fraction": 0.01, "range_sigma_floor_m": 0.03, "wheel_speed_sigma_mps": sigma_mps}
     robot = replace(ROBOT, step_us=20_000, wheel_noise="speedometer", field_of_view_rad=6.28, **noise)
     return Log("arc", Odometry("wheels", time_us, *told_m), sightings, None, None, robot)
 

@@ -263,9 +263,9 @@ def test_check_a_robot_at_rest_or_on_a_straight_says_what_it_cannot_test():
     assert any("hardly turns" in one for one in straight.untested)
 
 
-@pytest.mark.parametrize("seed", [8, 11])
-def test_check_an_arc_does_not_tell_a_wheel_from_the_scale_of_the_turn(seed):
-    findings, report = found(arc(seed))
+@pytest.mark.parametrize(("seed", "sigma_mps"), [(8, 0.01), (11, 0.01), (3, 0.1), (7, 0.1)])
+def test_check_an_arc_does_not_tell_a_wheel_from_the_scale_of_the_turn(seed, sigma_mps):
+    findings, report = found(arc(seed, sigma_mps))
     assert findings == []
     assert [one for one in report.untested if one.endswith("the drive has one curvature")]
     assert not {"turn", "bend"} & set(report.estimates)
