@@ -48,7 +48,8 @@ class RawTable {
     }
 
     get text() {
-        return [this.names, ...this.rows].map((row) => row.join()).join("\n") + "\n";
+        const field = (text) => (/[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+        return [this.names, ...this.rows].map((row) => row.map(field).join()).join("\n") + "\n";
     }
 }
 

@@ -20,8 +20,8 @@ function fieldsOf(line) {
     if (!line.includes('"')) {
         return line.split(",");
     }
-    const fields = [...line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)];
-    return fields.map((match) => (match[1] === undefined ? match[2] : match[1].replaceAll('""', '"')));
+    const fields = [...`,${line}`.matchAll(/,(?:"((?:[^"]|"")*)"?)?([^,]*)/g)];
+    return fields.map(([, within = "", behind]) => within.replaceAll('""', '"') + behind);
 }
 
 /** The columns of a file: texts and values by name, and of each row its line. */

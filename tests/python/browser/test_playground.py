@@ -1,10 +1,12 @@
 """The playground in a browser: the same bits as on the host, logs that are dropped, the words of `check`."""
 
+import csv
 import gzip
 import subprocess
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -405,6 +407,29 @@ def test_playground_names_what_is_no_log_and_stays_as_it_is(playground, tmp_path
         assert "\n" not in said
         assert figures(playground) == before
         expect(playground.locator("#title")).to_have_text("A robot in a room")
+
+
+def test_playground_reads_quotes_as_the_strict_reader_does(functions):
+    lines = ["".join(letters) for count in range(1, 7) for letters in product('a,"', repeat=count)]
+    fields = [next(csv.reader([line]), [""]) if '"' in line else line.split(",") for line in lines]
+    assert functions.evaluate("lines => lines.map(fieldsOf)", lines) == fields
+
+
+def test_playground_identities_with_commas_outlast_what_is_put_right(functions, tmp_path):
+    texts = texts_of(folder_of(made_up(seconds=10.0), tmp_path / "drive"))
+    head, *rows = scaled(texts["sightings.csv"], "bearing_rad", 180.0 / np.pi).splitlines()
+    quoted = [",".join((time_us, f'"shelf {one}, ""left"""', *rest)) for time_us, one, *rest in
+              (row.split(",") for row in rows)]  # fmt: skip
+    texts["sightings.csv"] = "\n".join([head, *quoted]) + "\n"
+    del texts["beacons.csv"]
+    found = functions.evaluate(
+        """async texts => {
+            const { log, findings } = await checkLog("log", texts);
+            return [findings[0].kind, log.words[0], log.sightings.id.length];
+        }""",
+        texts,
+    )
+    assert found == ["degrees", 'shelf 0, "left"', len(rows)]
 
 
 def test_playground_says_what_the_strict_reader_says(playground, tmp_path):
