@@ -42,6 +42,15 @@ function quoted(text) {
     return text.includes("'") && !text.includes('"') ? `"${text}"` : `'${text.replaceAll("'", "\\'")}'`;
 }
 
+/** A value of a file, as Python prints it: a number, a text in quotes, a table of these. */
+function shown(value) {
+    if (typeof value === "object") {
+        const pairs = Object.entries(value).map(([key, one]) => `${quoted(key)}: ${shown(one)}`);
+        return `{${pairs.join(", ")}}`;
+    }
+    return typeof value === "string" ? quoted(value) : String(value);
+}
+
 /** A number as C's %g has it. */
 function general(value, digits = 6) {
     const [mantissa, exponent] = value

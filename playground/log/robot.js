@@ -1,6 +1,13 @@
 "use strict";
 // robot.toml: the few kinds of lines that it may have, and what each key may hold (host_sim/bslam/log.py).
 
+const TOML_NUMBER = /^[+-]?(0|[1-9]\d*)(\.\d+)?(e[+-]?\d+)?$/i;
+const TOML_WORDS = new Map([
+    ["inf", Infinity],
+    ["+inf", Infinity],
+    ["true", true],
+    ["false", false],
+]);
 const TICK_KEYS = ["left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits"];
 
 const inRange = (low, high) => ({
@@ -71,9 +78,8 @@ function readRobot(file, text) {
     for (const [key, value] of Object.entries(table)) {
         requireKnown(`${file}, key ${key}: no such key`, key, Object.keys(ROBOT_RULES));
         if (!ROBOT_RULES[key].holds(value)) {
-            const said = typeof value === "string" ? quoted(value) : value;
             const { allowed } = ROBOT_RULES[key];
-            throw new PageError(`${file}, key ${key}: ${said} is not allowed; allowed: ${allowed}`);
+            throw new PageError(`${file}, key ${key}: ${shown(value)} is not allowed; allowed: ${allowed}`);
         }
     }
     requireKeys(file, table);
@@ -105,13 +111,15 @@ function requireKeys(file, table) {
 
 /** Lines of key = value, under [table] perhaps; of values, numbers, texts and true or false. */
 function parseToml(file, text) {
-    const root = {};
+    const root = Object.create(null); // else a key __proto__ would be none
     let table = root;
     linesOf(text.replace(/^\ufeff/, "")).forEach((line, index) => {
         const [, head] = line.match(/^\s*\[\s*([\w-]+)\s*\]\s*(?:#.*)?$/) || [];
         const [, key, value] = line.match(/^\s*([\w-]+)\s*=\s*(.*?)\s*$/) || [];
-        if (head) {
-            table = root[head] = root[head] || {};
+        if (head ? head in root : key && key in table) {
+            throw tomlError(file, index + 1, line, "each key once");
+        } else if (head) {
+            table = root[head] = Object.create(null);
         } else if (key) {
             table[key] = tomlValue(file, index + 1, line, value);
         } else if (!/^\s*(#.*)?$/.test(line)) {
@@ -127,17 +135,16 @@ function tomlValue(file, number, line, text) {
         return word;
     }
     const bare = text.replace(/\s*#.*$/, "");
-    const value =
-        { inf: Infinity, "+inf": Infinity, true: true, false: false }[bare] ??
-        numberOf(bare.replace(/(\d)_(?=\d)/g, "$1"));
-    if (Number.isNaN(value)) {
+    if (TOML_WORDS.has(bare)) {
+        return TOML_WORDS.get(bare);
+    }
+    const digits = bare.replace(/(\d)_(?=\d)/g, "$1");
+    if (!TOML_NUMBER.test(digits)) {
         throw tomlError(file, number, line);
     }
-    return value;
+    return Number(digits);
 }
 
-function tomlError(file, number, line) {
-    return new PageError(
-        `${file}: not TOML: ${quoted(line)} (line ${number}); allowed: lines of key = value`,
-    );
+function tomlError(file, number, line, allowed = "lines of key = value") {
+    return new PageError(`${file}: not TOML: ${quoted(line)} (line ${number}); allowed: ${allowed}`);
 }

@@ -389,6 +389,26 @@ BAD_DROPS = {
         instead("robot.toml", lambda text: text.replace("wheelbase_m = 0.3", "wheelbase_m = 300")),
         "robot.toml, key wheelbase_m: 300 is not allowed; allowed: a number from 0.001 to 10",
     ),
+    "a key twice": (
+        instead("robot.toml", lambda text: text + "wheelbase_m = 0.5\n"),
+        "robot.toml: not TOML: 'wheelbase_m = 0.5' (line 17); allowed: each key once",
+    ),
+    "a table twice": (
+        instead("robot.toml", lambda text: text + "[settings]\ngate_d2 = 9\n[settings]\n"),
+        "robot.toml: not TOML: '[settings]' (line 19); allowed: each key once",
+    ),
+    "no number of TOML": (
+        instead("robot.toml", lambda text: text.replace("wheelbase_m = 0.3", "wheelbase_m = .3")),
+        "robot.toml: not TOML: 'wheelbase_m = .3' (line 1); allowed: lines of key = value",
+    ),
+    "a name of JavaScript": (
+        instead("robot.toml", lambda text: text + "__proto__ = 9\n"),
+        "robot.toml, key __proto__: no such key; allowed: wheelbase_m,",
+    ),
+    "a setting's word": (
+        instead("robot.toml", lambda text: text + "[settings]\ngate_d2 = '9'\n"),
+        "robot.toml, key settings: {'gate_d2': '9'} is not allowed; allowed: a table of",
+    ),
     "a setting": (
         instead("robot.toml", lambda text: text + "[settings]\nfilte = 1\n"),
         "robot.toml, [settings], key filte: no such setting; allowed: wheelbase_m,",
