@@ -45,7 +45,7 @@ async function loadFiles(given) {
 async function runLog(checked, choices) {
     await asNewest(async (isNewest) => {
         say(`${checked.log.name}: runs`);
-        const replay = await new Replay(checked.log, { ...choices, recovery: false }).run();
+        const replay = await new Replay(checked.log, { ...choices, recovery: false }).run(isNewest);
         if (!isNewest()) {
             return;
         }

@@ -64,8 +64,8 @@ class Replay {
         this.timesUs = stepTimesUs(log);
     }
 
-    /** Feeds everything; a frame goes in after the odometry that covers it. */
-    async run() {
+    /** Feeds everything, as long as it is wanted; a frame goes in after the odometry that covers it. */
+    async run(isWanted = () => true) {
         const { timeUs } = this.log.odometry;
         const isWheels = this.timesUs.length > timeUs.length;
         if (isWheels) {
@@ -80,6 +80,9 @@ class Replay {
             this.step(row, row === timeUs.length - 1);
             if (row % ROWS_AT_ONCE === 0) {
                 await breath();
+                if (!isWanted()) {
+                    break;
+                }
             }
         }
         return this;

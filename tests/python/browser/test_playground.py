@@ -452,6 +452,19 @@ def test_playground_identities_with_commas_outlast_what_is_put_right(functions, 
     assert found == ["degrees", 'shelf 0, "left"', len(rows)]
 
 
+def test_playground_a_replay_ends_where_nobody_wants_it(functions, tmp_path):
+    texts = texts_of(folder_of(made_up(seconds=90.0), tmp_path / "drive"))
+    steps = functions.evaluate(
+        """async texts => {
+            const log = readLog("log", texts);
+            const run = isWanted => new Replay(log, usualChoices(log)).run(isWanted);
+            return [(await run(() => false)).poses.length, (await run(() => true)).poses.length];
+        }""",
+        texts,
+    )
+    assert steps[0] < steps[1] == 90 * 25 + 1
+
+
 def test_playground_says_what_the_strict_reader_says(playground, tmp_path):
     good = folder_of(made_up(seconds=10.0), tmp_path / "drive")
     texts = texts_of(good)
