@@ -1,4 +1,4 @@
-/// What the micro:bit keeps: parameters in the last two pages of the nRF51822's flash, a map in the four
+/// What the micro:bit keeps: parameters in the last two pages of the nRF51822's flash, a map in the six
 /// before. Nordic's nRF51 reference manual, chapter "NVMC". QEMU's board has them.
 #include "port/kept.h"
 
@@ -16,6 +16,15 @@
 #define CONFIG_ERASE 2u
 
 #define PAGE_BYTES 0x400u
+#define MAP_SLOT_BYTES (3 * PAGE_BYTES)
+
+// docs/MAP.md, "Two slots": a slot holds the largest map, whatever the robot comes to know.
+enum {
+    VALUES = 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX,
+    LARGEST_MAP_BYTES = 56 + 38 * BSLAM_BEACONS_MAX + 30 * VALUES + 2 * VALUES * VALUES
+};
+_Static_assert(BSLAM_FLASH_PIECE + LARGEST_MAP_BYTES <= MAP_SLOT_BYTES && !BSLAM_APPEARANCE,
+               "a map may outgrow its slot: more pages, or fewer beacons or rays in board.mk");
 
 /// Two slots, one after the other.
 typedef struct area {
@@ -24,7 +33,7 @@ typedef struct area {
 } area_t;
 
 static const area_t params_area = {0x3f800u, PAGE_BYTES};
-static const area_t map_area = {0x3e800u, 2 * PAGE_BYTES};
+static const area_t map_area = {0x3e000u, MAP_SLOT_BYTES};
 
 static uint32_t place(const area_t *area, int slot, uint32_t at)
 {
@@ -72,7 +81,7 @@ static bool read(void *context, int slot, uint32_t at, void *bytes, uint32_t cou
 }
 
 static const bslam_flash_t params_flash = {erase, write, read, (void *)&params_area, PAGE_BYTES};
-static const bslam_flash_t map_flash = {erase, write, read, (void *)&map_area, 2 * PAGE_BYTES};
+static const bslam_flash_t map_flash = {erase, write, read, (void *)&map_area, MAP_SLOT_BYTES};
 
 const bslam_flash_t *port_flash(void)
 {

@@ -92,6 +92,22 @@ def test_a_reset_in_mid_run_costs_a_guarded_board_nothing_and_another_all():
         _restart_a_guarded_one(line)
 
 
+def test_a_board_s_flash_has_room_for_as_many_beacons_as_its_memory_has():
+    """Each by its direction alone: four values of the state, and the sensor's four beside them."""
+    params = PARAMS | {"correlation_m": 0.3, "sensor_doubt": 1}
+    with contextlib.closing(QemuLine("microbit")) as line:
+        robot = RemoteSlam(line, params, 6)
+        robot.sightings(0, [], [], [], [])
+        for time_us in range(40_000, 240_000, 40_000):
+            robot.odometry("wheels", time_us, 0.004, 0.004)
+            robot.sightings(time_us, np.arange(-3, 3) / 3, [np.nan] * 6, range(6), [True] * 6)
+        blob = robot.save_map()
+        assert len(blob) > 2000 and len(robot.beacons()) == 6
+        robot.keep_map()
+        robot = restarted(line, robot, "somewhere in the map that it kept")
+        assert robot.save_map() == as_loaded(blob)
+
+
 def _restart_a_guarded_one(line):
     course = Course(RemoteSlam(line, PARAMS | {"recovery": 1, "guard": 1}, 6))
     course.slam.sightings(0, [], [], [], [])
