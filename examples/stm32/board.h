@@ -53,8 +53,7 @@ static void board_init(void)
 static int64_t board_time_us(void)
 {
     static int64_t now_us;
-    now_us += (uint32_t)(REGISTER(TIMER_CLOCK + 0x24) - (uint32_t)now_us);
-    return now_us;
+    return now_us += (uint32_t)(REGISTER(TIMER_CLOCK + 0x24) - (uint32_t)now_us);
 }
 
 // The detector's bytes, by the interrupt: none is lost while the filter works.
@@ -63,7 +62,7 @@ static volatile uint8_t received_count;
 
 void usart2_interrupt(void)  // in startup.s
 {
-    const uint32_t status = REGISTER(USART2);  // reading the it first ends an overrun
+    const uint32_t status = REGISTER(USART2);  // reading it first ends an overrun
     received[received_count] = (char)REGISTER(USART2 + 0x04);
     received_count += status >> 5 & 1;  // there was a byte
 }

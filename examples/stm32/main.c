@@ -25,8 +25,9 @@ static void listen_to_detector(void)
     static char line[64];
     static uint8_t length, taken;
     while (taken != received_count) {
-        line[length++] = received[taken++];
-        if (line[length - 1] == '\n' || length == sizeof line - 1) {  // what is too long is noise
+        line[length] = received[taken++];
+        length += length < sizeof line - 1;  // what is too long ends without a line feed, and is noise
+        if (received[(uint8_t)(taken - 1)] == '\n') {
             line[length] = '\0';
             length = 0;
             take_sighting(line);

@@ -75,11 +75,11 @@ static void listen_to_detector() {
   static size_t length = 0;
   while (Serial1.available() > 0) {
     const char byte = Serial1.read();
-    if (byte == '\n' || length == sizeof line - 1) {  // what is too long is noise
+    if (byte == '\n') {
       line[length] = '\0';
       length = 0;
       take_sighting(line);
-    } else if (byte != '\r') {
+    } else if (byte != '\r' && length < sizeof line - 1) {  // what is too long is noise to its end
       line[length++] = byte;
     }
   }

@@ -75,11 +75,11 @@ static void listen_to_detector(TickType_t end)
     static char line[64];
     static size_t length;
     for (char byte; uart_read_bytes(UART_NUM_1, &byte, 1, ticks_until(end)) == 1;) {
-        if (byte == '\n' || length == sizeof line - 1) {  // what is too long is noise
+        if (byte == '\n') {
             line[length] = '\0';
             length = 0;
             take_sighting(line);
-        } else if (byte != '\r') {
+        } else if (byte != '\r' && length < sizeof line - 1) {  // what is too long is noise to its end
             line[length++] = byte;
         }
     }

@@ -1,6 +1,6 @@
 // A made-up drive for the examples' robots: a circle of 0.8 m at 0.3 m/s among five tags, a left wheel that
 // slips by one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second,
-// in lines that end either way.
+// in lines that end either way; one is too long, and ends as a sighting does.
 #ifndef DRIVE_H
 #define DRIVE_H
 
@@ -11,6 +11,8 @@
 #define DRIVE_US 42000000  // two and a half rounds
 #define PICTURE_US 100000
 #define AGE_US 40000
+#define NOISE_US 7700000
+#define NOISE "63 letters, after which the examples have no room for any more:40 9 0 2000\n"
 
 static const double drive_tags[5][2] = {{2.0, 0.5}, {1.0, 2.5}, {-2.0, 1.5}, {-1.0, -1.5}, {1.5, -1.2}};
 
@@ -34,7 +36,7 @@ static inline long drive_ticks(int64_t time_us, int side)
 static inline int drive_lines(int64_t time_us, char *text, size_t room)
 {
     double pose[3];
-    int length = 0;
+    int length = time_us == NOISE_US ? snprintf(text, room, "%s", NOISE) : 0;
     drive_pose(time_us - AGE_US, pose);
     for (int i = 0; i < 5; i++) {
         const double dx = drive_tags[i][0] - pose[0] - 0.05 * cos(pose[2]);
