@@ -9,6 +9,7 @@ For each reading of its encoders the robot reports its pose: TIME_US X_M Y_M HEA
 
 from __future__ import annotations
 
+import io
 import queue
 import sys
 import threading
@@ -46,7 +47,9 @@ class Seen:
 def read_line(line: str) -> Seen:
     """Raises ValueError for what is no such line."""
     now_s = time.monotonic()
-    age_ms, label, bearing_mrad, range_mm = map(int, line.split())
+    age_ms, label, bearing_mrad, range_mm = numbers = [int(word) for word in line.split()]
+    if max(map(abs, numbers)) >= 2**31:
+        raise ValueError(line)
     return Seen(now_s - 1e-3 * age_ms, label, 1e-3 * bearing_mrad, 1e-3 * range_mm)
 
 
@@ -59,7 +62,9 @@ def listen(detector: TextIO) -> queue.SimpleQueue[Seen | None]:
             try:
                 told.put(read_line(line))
             except ValueError:
-                print(f"no sighting: {line.rstrip()!r}; allowed: four whole numbers", file=sys.stderr)
+                print(
+                    f"no sighting: {line.rstrip()!r}; allowed: four whole numbers of 32 bits", file=sys.stderr
+                )
         told.put(None)
 
     threading.Thread(target=read, daemon=True).start()
@@ -90,9 +95,10 @@ def follow(robot: RemoteSlam, told: queue.SimpleQueue[Seen | None]) -> None:
 
 def main(target: str) -> int:
     """The exit status."""
+    detector = io.TextIOWrapper(sys.stdin.buffer, "utf-8", "replace")  # noise is named, and ends nothing
     try:
         with connect(target, SETTINGS, BEACONS) as robot:
-            follow(robot, listen(sys.stdin))
+            follow(robot, listen(detector))
             robot.update()
             for beacon in robot.beacons():
                 print(f"tag {beacon.label}: x {beacon.x_m:.3f} m, y {beacon.y_m:.3f} m", flush=True)
@@ -103,4 +109,6 @@ def main(target: str) -> int:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("allowed: live_robot.py TARGET, as serial:/dev/ttyUSB0")
     sys.exit(main(sys.argv[1]))

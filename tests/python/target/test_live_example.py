@@ -85,7 +85,7 @@ def test_it_watches_the_robot_and_tells_it_of_the_tags(device):
         rest, said = example.communicate(timeout=30)
     assert example.returncode == 0, said
     noise, *refused = said.splitlines()
-    assert noise == "no sighting: 'noise'; allowed: four whole numbers"
+    assert noise == "no sighting: 'noise'; allowed: four whole numbers of 32 bits"
     assert all("BSLAM_E_TIME" in line for line in refused)  # the same again, told between two reports
     assert math.hypot(x_m - truth[0], y_m - truth[1]) < 0.05
     assert abs(math.remainder(heading_rad - truth[2], 2 * math.pi)) < 0.05
@@ -100,6 +100,16 @@ def test_without_wheels_it_ends_with_the_detector():
     done = subprocess.run(command, input="0 7 0 2000\n", capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == "tag 7 before the robot said what time it is: left out\n"
+
+
+def test_noise_of_its_detector_ends_nothing():
+    command = [sys.executable, EXAMPLE, f"process:{ROBOT}"]
+    environment = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}
+    noise = b"\xff\xfe\n99999999999 7 0 2000\n0 7 0 2000\n"
+    done = subprocess.run(command, input=noise, capture_output=True, env=environment, check=False, timeout=60)
+    lines = done.stderr.decode().splitlines()
+    assert [line.split(":")[0] for line in lines[:2]] == ["no sighting"] * 2
+    assert lines[2].startswith("tag 7 before the robot said")
 
 
 def test_a_device_that_is_none_is_one_line():
