@@ -3,7 +3,8 @@
 //     desktop_csv FOLDER [SETTING=VALUE ...] > path.tum
 //
 // The path goes to standard output, a row for each of odometry's: time_s x y 0 0 0 qz qw, the TUM format. The
-// map goes to standard error. Exit status 1: the filter refused something, 2: it could not begin.
+// map goes to standard error. Exit status 1: the filter refused something, or the path cannot be written;
+// 2: it could not begin, or a file is bad.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,13 +40,14 @@ static const char *field_of(const char *titles, const char *row, const char *tit
     return more == NULL || rest == NULL ? NULL : field_of(more + 1, rest + 1, title);
 }
 
-/// A number of the row; `otherwise` where there is no such column, or nothing in it.
+/// A number of the row, a whole one but of metres and radians; `otherwise` where there is no such column, or
+/// nothing in it.
 static double value(const struct table *table, const char *title, double otherwise)
 {
-    const char *field = field_of(table->header, table->row, title);
-    char *end = NULL;
-    const double number = field == NULL ? otherwise : strtod(field, &end);
-    require(end == NULL || strchr(",\r\n", *end) != NULL, table->path, title, table->row);  // no number there
+    const char *field = field_of(table->header, table->row, title), *end = NULL;
+    const double number = field == NULL ? otherwise : strtod(field, (char **)&end);
+    const bool is_fine = strstr(title, "_m") || strstr(title, "_rad") || number == trunc(number);
+    require(end == NULL || (strchr(",\r\n", *end) && is_fine), table->path, title, table->row);
     return end == field ? otherwise : number;
 }
 
@@ -137,6 +139,6 @@ int main(int argc, char **argv)
     for (int i = 0; bslam_beacon(&robot, i, &beacon) == BSLAM_OK; i++) {
         fprintf(stderr, "beacon %d: x %.9g m, y %.9g m\n", (int)beacon.label, beacon.x_m, beacon.y_m);
     }
-    fprintf(stderr, "%d rows and frames refused\n", refused);
-    return refused > 0 ? 1 : 0;
+    fprintf(stderr, "%d rows and frames refused%s\n", refused, fflush(stdout) ? "; path cut short" : "");
+    return refused > 0 || ferror(stdout) ? 1 : 0;
 }

@@ -80,6 +80,7 @@ def test_desktop_csv_gives_what_replay_gives(
         (["drive", "wheelbase_m=0.3abc"], "setting: wheelbase_m=0.3abc: allowed: NAME=VALUE"),
         (["bad"], "bad/odometry.csv: left_m: 40000,1 cm,0.1"),
         (["gyro"], "gyro/odometry.csv: gyro_radps: allowed: time_us,left_m,right_m,left_ticks,right_ticks"),
+        (["halves"], "halves/sightings.csv: beacon_id: 0,1.5,0.1"),
         (["left"], "left/odometry.csv: left: allowed: time_us,left_m"),
     ],
 )
@@ -92,13 +93,21 @@ def test_desktop_csv_says_in_a_line_what_is_bad(
         "gyro": "left_m,right_m,gyro_radps\n40000,0.1,0.1,0",
         "left": "left,right\n40000,0.1,0.1",
     }
+    drives["halves"] = drives["drive"]
     for folder, rows in drives.items():
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "odometry.csv").write_text(f"time_us,{rows}\n")
-        (tmp_path / folder / "sightings.csv").write_text("time_us,beacon_id,bearing_rad\n0,1,0.1\n")
+        one = "1.5" if folder == "halves" else "1"
+        (tmp_path / folder / "sightings.csv").write_text(f"time_us,beacon_id,bearing_rad\n0,{one},0.1\n")
     done = run(desktop_csv, *words, folder=tmp_path, expect=2)
     assert done.stderr.startswith(f"desktop_csv: {says}")
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_desktop_csv_says_that_its_path_is_not_written(tmp_path: Path, desktop_csv: Path) -> None:
+    log_of("wheels").write(tmp_path / "drive")
+    done = run("sh", "-c", f"{desktop_csv} drive > /dev/full", folder=tmp_path, expect=1)
+    assert done.stderr.splitlines()[-1] == "0 rows and frames refused; path cut short"
 
 
 # ---- keep_the_map ------------------------------------------------------------------------------------------
