@@ -12,7 +12,7 @@ typedef enum bslam_status {
     BSLAM_E_NOT_FINITE,  ///< an input is NaN, infinite or beyond 1e12
     BSLAM_E_TIME,        ///< a time stamp does not advance, or lies outside what the history covers
     BSLAM_E_RANGE,       ///< an input is finite and outside what its field allows
-    BSLAM_E_JUMP,        ///< a wheel would have moved faster than speed_max_mps: encoder reset or glitch
+    BSLAM_E_JUMP,        ///< a wheel faster than speed_max_mps: encoder reset, glitch, travel not in m
     BSLAM_E_COUNT,       ///< more items than BSLAM_SIGHTINGS_MAX
     BSLAM_E_MAP_FULL,    ///< the map holds BSLAM_BEACONS_MAX beacons, or BSLAM_RAYS_MAX rays
     BSLAM_E_NO_BEACON,   ///< no such beacon in the map
@@ -20,7 +20,7 @@ typedef enum bslam_status {
     BSLAM_E_PARAMETER,   ///< a setting is outside its range, or contradicts another
     BSLAM_E_SINGULAR,    ///< a covariance is not positive definite where it must be
     BSLAM_E_MAP,         ///< a stored map is refused, or cannot be stored: the fault beside it says why
-    BSLAM_E_STATE,       ///< the pipeline's memory is not as it was sealed
+    BSLAM_E_STATE,       ///< bslam_init has not succeeded, or the memory is not as it was sealed
     BSLAM_E_SIZE,        ///< library and application were compiled with other sizes
     BSLAM_STATUS_COUNT
 } bslam_status_t;

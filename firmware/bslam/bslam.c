@@ -97,7 +97,7 @@ static void check_members(bslam_instance_t *robot)
 }
 #endif
 
-/// The pipeline, if its memory is as the step before left it; else NULL, for BSLAM_E_STATE.
+/// The pipeline, if it has begun and is as the step before left it; else NULL, for BSLAM_E_STATE.
 static bslam_slam_t *begin_step(bslam_t *robot)
 {
     bslam_instance_t *instance = bslam_instance(robot);
@@ -110,7 +110,7 @@ static bslam_slam_t *begin_step(bslam_t *robot)
         check_members(instance);
     }
 #endif
-    return &instance->slam;
+    return instance->slam.settings.wheelbase_m > 0 ? &instance->slam : NULL;  // 0: nothing has begun it
 }
 
 /// A step that failed has changed counters, which are sealed, too.

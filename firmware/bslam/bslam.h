@@ -15,11 +15,11 @@
 ///
 /// The map's frame is the robot's pose at the start: x forward, y left, SI units, angles in (-pi, pi].
 ///
-/// Every instance is its caller's; there is no heap, no global state, no output. One instance must not be
-/// entered twice at a time, and must not be moved or copied. On any status but BSLAM_OK it is as it was, to
-/// the bit, but for its counters, its health, and what it holds against refused stamps and tick counts.
-///
-/// Costs are in the number n of state values: 5 for the robot, 2 a beacon, up to 2 more a ray.
+/// Every instance is its caller's: no heap, no global state, no output. It must not be entered twice at a
+/// time, moved or copied. A pointer may be NULL only where a comment says so. On any status but BSLAM_OK the
+/// instance is as it was, to the bit, but for its counters, its health, and what it holds against refused
+/// stamps and tick counts. Costs are in the number n of state values: 5 for the robot, 2 a beacon, up to 2
+/// more a ray.
 #ifndef BSLAM_H
 #define BSLAM_H
 
@@ -48,10 +48,11 @@ typedef union bslam {
 
 // ---- beginning --------------------------------------------------------------------------------------------
 
-/// Robot at the origin, empty map. The settings are copied. BSLAM_E_PARAMETER: *bad_setting is the first
-/// setting outside its range, or that contradicts another (bslam_settings_info); else it becomes -1.
-/// BSLAM_E_SIZE: library and application were compiled with other sizes (config.h); *robot is not written
-/// then. BSLAM_E_COUNT: more seeds than BSLAM_SEEDS_MAX. O(memory).
+/// Robot at the origin, empty map. The settings are copied. In zeroed memory, as static is, each call
+/// until it succeeds answers BSLAM_E_STATE; those that only read check nothing. BSLAM_E_PARAMETER:
+/// *bad_setting is the first setting outside its range, or that contradicts another (bslam_settings_info);
+/// else it becomes -1. BSLAM_E_SIZE: library and this file were compiled with other sizes (config.h); *robot
+/// is not written, and must not be used. BSLAM_E_COUNT: more seeds than BSLAM_SEEDS_MAX. O(memory).
 #define bslam_init(robot, settings, bad_setting) \
     bslam_init_sized((robot), sizeof *(robot), BSLAM_SIZES_HASH, (settings), (bad_setting))
 #if BSLAM_REAL_DOUBLE
@@ -60,11 +61,10 @@ typedef union bslam {
 BSLAM_MUST_CHECK bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t sizes_hash,
                                                  const bslam_settings_t *settings, int *bad_setting);
 
-/// After a reset that the memory outlasted, or after BSLAM_E_STATE: goes on with the state if it is as it was
-/// after the last call, else with the copy of it that BSLAM_GUARD = 2 keeps. The next odometry reading starts
-/// the clock anew, at any time stamp. The pose becomes as doubtful as bslam_resume_odometry has it, with the
-/// same ranges. BSLAM_E_STATE: the memory holds no such state; nothing has changed: bslam_init. Only with the
-/// setting `guard`. O(n²).
+/// With the setting `guard`, after a reset that the memory outlasted, or BSLAM_E_STATE: goes on with the
+/// state if it is as the last call left it, else with the copy that BSLAM_GUARD = 2 keeps. The next odometry
+/// reading starts the clock anew, at any time stamp. The pose becomes as doubtful as bslam_resume_odometry
+/// has it, in the same ranges. BSLAM_E_STATE: no such state; nothing has changed: bslam_init. O(n²).
 BSLAM_MUST_CHECK bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m,
                                               bslam_real_t heading_sd_rad);
 
@@ -111,12 +111,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real
                                                       bslam_real_t heading_sd_rad);
 
 /// What one image shows (bslam_sighting_t: base/types.h), stamped time_us. Associates, fuses, adds beacons
-/// and removes them; bslam_results tells what became of each. An empty frame is fine, several of one moment
-/// are, and any order. Of sightings with one label the best is used. O(count n²), after a prediction for each
-/// reading that waited. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: older than
-/// BSLAM_HISTORY_MAX readings, newer than odometry by more than ahead_max_us, or one of the last
-/// BSLAM_HISTORY_MAX frames again. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a distance or its noise outside 1 mm to
-/// 10 km, a direction beyond +-2 pi or its noise outside 1e-5 to pi, a label below -1. bslam_health says
+/// and removes them; bslam_results tells what became of each. An empty frame (NULL, 0) is fine, so are
+/// several of one moment, and any order. Of sightings with one label the best is used. O(count n²), after a
+/// prediction for each reading that waited. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME:
+/// older than BSLAM_HISTORY_MAX readings, newer than odometry by more than ahead_max_us, or one of the last
+/// BSLAM_HISTORY_MAX frames again. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a distance or its noise outside 1 mm
+/// to 10 km, a direction beyond +-2 pi or its noise outside 1e-5 to pi, a label below -1. bslam_health says
 /// which sighting.
 BSLAM_MUST_CHECK bslam_status_t bslam_sightings(bslam_t *robot, int64_t time_us,
                                                 const bslam_sighting_t *sightings, int count);

@@ -129,6 +129,25 @@ static void test_init_refuses_seeds_that_cannot_be(void **state)
     assert_int_equal(bslam_init(&robot, &settings, &bad_setting), BSLAM_OK);
 }
 
+static void test_nothing_begins_without_an_init_that_succeeds(void **state)
+{
+    static const bslam_t zeroed;
+    const bslam_pose_t origin = {0, 0, 0};
+    int bad_setting;
+    uint32_t bytes;
+    memset(&robot, 0, sizeof robot);
+    settings.wheelbase_m = 0;
+    assert_int_equal(bslam_init(&robot, &settings, &bad_setting), BSLAM_E_PARAMETER);
+    assert_int_equal(roll(0, 0), BSLAM_E_STATE);
+    assert_int_equal(look_from(0, 0, 0, 1), BSLAM_E_STATE);
+    assert_int_equal(bslam_resume_odometry(&robot, 0, 0), BSLAM_E_STATE);
+    assert_int_equal(bslam_set_pose(&robot, &origin, 0, 0), BSLAM_E_STATE);
+    assert_int_equal(bslam_add_known_beacon(&robot, 77, 0, 0), BSLAM_E_STATE);
+    assert_int_equal(bslam_save_map(&robot, NULL, &bytes), BSLAM_E_STATE);
+    bslam_freeze_map(&robot, true);
+    assert_memory_equal(&robot, &zeroed, sizeof robot);
+}
+
 static void test_init_begins_at_the_origin_without_a_map(void **state)
 {
     const bslam_health_t health = bslam_health(&robot);
@@ -509,6 +528,7 @@ int main(void)
         cmocka_unit_test_setup(test_init_of_another_size_is_refused_and_writes_nothing, setup),
         cmocka_unit_test_setup(test_init_names_the_setting_that_it_refuses, setup),
         cmocka_unit_test_setup(test_init_refuses_seeds_that_cannot_be, setup),
+        cmocka_unit_test_setup(test_nothing_begins_without_an_init_that_succeeds, setup),
         cmocka_unit_test_setup(test_init_begins_at_the_origin_without_a_map, setup),
         cmocka_unit_test_setup(test_two_robots_share_nothing, setup),
 
