@@ -36,7 +36,8 @@ def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path):
         "    const bslam_status_t status = bslam_init(&robot, &settings, &bad_setting);\n"
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
-    cmake("-S", tmp_path, "-B", tmp_path / "build")
+    said = cmake("-S", tmp_path, "-B", tmp_path / "build")
+    assert "BSLAM_SIZES is 'BSLAM_BEACONS_MAX=7;BSLAM_RAYS_MAX=0'" in said
     cmake("--build", tmp_path / "build")
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
 
@@ -104,10 +105,15 @@ def refused(*words):
     return " ".join(done.stderr.split())
 
 
-@pytest.mark.parametrize("size", ["BSLAM_BEACON_MAX=7", "BSLAM_BEACONS_MAX", "BSLAM_BEACONS_MAX=many", "7"])
+NO_SIZES = ["BSLAM_BEACON_MAX=7", "BSLAM_BEACONS_MAX", "BSLAM_BEACONS_MAX=many", "7"]
+NOT_SEPARATED = ["BSLAM_BEACONS_MAX=50 BSLAM_GUARD=0", "BSLAM_BEACONS_MAX=50,BSLAM_GUARD=0"]
+
+
+@pytest.mark.parametrize("size", [*NO_SIZES, *NOT_SEPARATED])
 def test_a_size_that_does_not_exist_is_refused(tmp_path, size):
     said = refused("-S", FIRMWARE, "-B", tmp_path, f"-DBSLAM_SIZES=BSLAM_RAYS_MAX=0;{size}")
     assert f"BSLAM_SIZES has '{size}'" in said and "BSLAM_BEACONS_MAX, " in said
+    assert "separated by semicolons" in said
 
 
 def options_of(folder, *words):
@@ -194,7 +200,10 @@ def version():
 def test_find_package_brings_the_sizes_and_other_sizes_are_refused(tmp_path, installed):
     (tmp_path / "CMakeLists.txt").write_text(USER.format(version=version(), sketches=SKETCHES))
     (tmp_path / "same.cpp").write_text(SAME)
-    cmake("-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={installed}")
+    sizes = "BSLAM_RAYS_MAX=0;BSLAM_BEACONS_MAX=7"
+    words = [f"-DCMAKE_PREFIX_PATH={installed}", f"-DBSLAM_SIZES={sizes}"]
+    said = cmake("-S", tmp_path, "-B", tmp_path / "build", *words)
+    assert "installed with BSLAM_SIZES 'BSLAM_BEACONS_MAX=7;BSLAM_RAYS_MAX=0'" in said
     cmake("--build", tmp_path / "build")
     assert subprocess.run([tmp_path / "build" / "same"]).returncode == 0
     said = subprocess.run([tmp_path / "build" / "other"], capture_output=True, text=True)
@@ -207,6 +216,10 @@ def test_find_package_brings_the_sizes_and_other_sizes_are_refused(tmp_path, ins
         ("99.0 CONFIG REQUIRED", f"bslamConfig.cmake, version: {version()}"),
         ("0.1 CONFIG REQUIRED", f"bslamConfig.cmake, version: {version()}"),
         ("CONFIG REQUIRED COMPONENTS eyes", "no component 'eyes'; allowed: bslam, vision, link"),
+        (
+            "CONFIG REQUIRED)\nset(BSLAM_SIZES BSLAM_BEACONS_MAX=8)\nfind_package(bslam CONFIG REQUIRED",
+            "'BSLAM_BEACONS_MAX=8', but bslam was installed with 'BSLAM_BEACONS_MAX=7;BSLAM_RAYS_MAX=0'",
+        ),
     ],
 )
 def test_find_package_refuses_what_is_not_installed(tmp_path, installed, asked, said):
