@@ -22,10 +22,20 @@ def cmake(*words):
     return done.stdout
 
 
-def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path):
+IN_A_HEADER = 'include_directories(.)\nadd_compile_definitions(BSLAM_CONFIG_HEADER="my_sizes.h")\n'
+
+
+@pytest.mark.parametrize(
+    ("sizes", "says"),
+    [
+        ("set(BSLAM_SIZES BSLAM_BEACONS_MAX=7 BSLAM_RAYS_MAX=0)\n", "BSLAM_BEACONS_MAX=7;BSLAM_RAYS_MAX=0"),
+        (IN_A_HEADER, ""),
+    ],
+)
+def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path, sizes, says):
+    (tmp_path / "my_sizes.h").write_text("#define BSLAM_BEACONS_MAX 7\n#define BSLAM_RAYS_MAX 0\n")
     (tmp_path / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES C)\n"
-        "set(BSLAM_SIZES BSLAM_BEACONS_MAX=7 BSLAM_RAYS_MAX=0)\n"
+        f"cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES C)\n{sizes}"
         f"add_subdirectory({FIRMWARE} bslam)\nadd_executable(user main.c)\n"
         "target_link_libraries(user PRIVATE bslam::bslam)\n"
     )
@@ -37,8 +47,8 @@ def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path):
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
     said = cmake("-S", tmp_path, "-B", tmp_path / "build")
-    assert "BSLAM_SIZES is 'BSLAM_BEACONS_MAX=7;BSLAM_RAYS_MAX=0'" in said
-    cmake("--build", tmp_path / "build")
+    assert f"BSLAM_SIZES is '{says}'" in said
+    cmake("--build", tmp_path / "build", "--target", "user")
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
 
 
