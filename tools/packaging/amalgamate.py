@@ -23,7 +23,10 @@ TYPE = re.compile(r"^(?:typedef )?(?:struct|union|enum) (\w+) \{$", re.MULTILINE
 ENUMERATION = re.compile(r"^(?:typedef )?enum(?: \w+)? \{(.*?)\}", re.MULTILINE | re.DOTALL)
 MACRO = re.compile(r"^#define (\w+)", re.MULTILINE)
 # Not every private function of a header is called; clang counts the headers in as its own.
-START = """#include "bslam.h"
+START = """#ifdef __cplusplus
+#error "bslam.c is C: compile it as C11"
+#endif
+#include "bslam.h"
 
 #ifdef __clang__
 #pragma clang diagnostic ignored "-Wunused-function"
@@ -58,11 +61,7 @@ def body(name: str, text: str) -> str:
 
 def renamed(text: str, names: set[str], prefix: str) -> str:
     """With a prefix to these names, but in texts and where they are members."""
-
-    def rename(match: re.Match[str]) -> str:
-        return f"{prefix}_{match[0]}" if match[0] in names else match[0]
-
-    return WORD_OR_TEXT.sub(rename, text)
+    return WORD_OR_TEXT.sub(lambda word: f"{prefix}_{word[0]}" if word[0] in names else word[0], text)
 
 
 def names_in(source: str) -> set[str]:

@@ -365,6 +365,12 @@ def test_amalgamation_has_one_header_for_cxx(two_files: Path, tmp_path: Path) ->
     run(*command, f"-I{two_files}", tmp_path / "sketch.cpp")
 
 
+def test_amalgamation_says_that_it_is_no_cxx(two_files: Path) -> None:
+    words = ["g++", "-fsyntax-only", str(two_files / "bslam.c")]
+    first = subprocess.run(words, capture_output=True, text=True).stderr.splitlines()[0]
+    assert "bslam.c is C: compile it as C11" in first
+
+
 def test_names_of_two_sources_are_told_apart_and_macros_end() -> None:
     start = '#include "bslam/bslam.h"\n'
     one = (
