@@ -9,8 +9,7 @@
 
 /// Of a number, of an address and of an enumeration: some compilers for cores take a byte for one.
 #define BSLAM_SIZE_REAL (BSLAM_REAL_DOUBLE ? 8 : 4)
-#define BSLAM_SIZE_POINTER ((int)sizeof(void *))
-#define BSLAM_SIZE_ENUM ((int)sizeof(bslam_status_t))
+enum { BSLAM_SIZE_POINTER = sizeof(void *), BSLAM_SIZE_ENUM = sizeof(bslam_status_t) };
 
 /// State values: 5 for the robot, 4 for its sensor, 2 a beacon, and room for 2 more a ray and 7 in passing;
 /// filled up to a multiple of four.
@@ -68,7 +67,7 @@
      8 * 8)
 
 /// Differs where sizes do, so that library and application notice: bslam_init.
-#define BSLAM_SIZES_MIX(hash, value) ((hash) * 16777619u + (uint32_t)(value))
+#define BSLAM_SIZES_MIX(hash, value) ((hash) * 16777619u + (value))
 #define BSLAM_SIZES_FEW \
     BSLAM_SIZES_MIX( \
         BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(2166136261u, BSLAM_REAL_DOUBLE), \

@@ -8,7 +8,7 @@
 
 /// Of a number and of an address.
 #define BSLAM_VISION_SIZE_REAL (BSLAM_REAL_DOUBLE ? 8 : 4)
-#define BSLAM_VISION_SIZE_POINTER ((int)sizeof(void *))
+enum { BSLAM_VISION_SIZE_POINTER = sizeof(void *) };
 #define BSLAM_VISION_SIZE_LARGER(a, b) ((a) > (b) ? (a) : (b))
 
 /// A picture's cells of 4x4 pixels, with room for loops that go 16 at a time; columns of them; pixels of its
@@ -90,7 +90,7 @@
      8 * 8)
 
 /// Differs where sizes do, so that library and application notice: bslam_vision_init.
-#define BSLAM_VISION_MIX(hash, value) ((hash) * 16777619u + (uint32_t)(value))
+#define BSLAM_VISION_MIX(hash, value) ((hash) * 16777619u + (value))
 #define BSLAM_VISION_HASH_OF_IMAGE \
     BSLAM_VISION_MIX( \
         BSLAM_VISION_MIX(BSLAM_VISION_MIX(2166136261u, BSLAM_REAL_DOUBLE), BSLAM_IMAGE_WIDTH_MAX), \

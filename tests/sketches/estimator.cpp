@@ -56,6 +56,6 @@ int main()
     }
     const bslam_pose_t pose = bslam_pose(&robot);
     const float error_m = pose.x_m - driven_m;
-    printf("driven %.2f m, estimated %.2f m\n", (double)driven_m, (double)pose.x_m);
+    printf("driven %.2f m, estimated %.2f m\n", static_cast<double>(driven_m), static_cast<double>(pose.x_m));
     return failed || !(error_m < 0.02F && error_m > -0.02F) || bslam_counters(&robot).slam.matched < 200;
 }

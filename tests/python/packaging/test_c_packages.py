@@ -57,8 +57,8 @@ def check_sketch(sketch: Path, *includes: str) -> None:
     """A sketch compiles that includes all headers as Arduino's sketches do."""
     text = "".join(f"#include <{header}>\n" for header in ("bslam.h", "bslam_vision.h", "bslam_link.h"))
     sketch.write_text(text + (SKETCHES / "estimator.cpp").read_text(encoding="utf-8"), encoding="utf-8")
-    flags = ("-mcpu=cortex-m4", "-mthumb", "-std=gnu++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
-    run("arm-none-eabi-g++", *flags, *includes, sketch)
+    flags = ("-mcpu=cortex-m4", "-mthumb", "-std=gnu++11", "-Wall", "-Wextra", "-Wold-style-cast", "-Werror")
+    run("arm-none-eabi-g++", "-fsyntax-only", *flags, *includes, sketch)
 
 
 def symbols(archive: Path, nm: str = "nm") -> set[str]:
