@@ -120,6 +120,21 @@ def _last_line_in_qemu(image: Path) -> str:
     return line.strip()
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "-DCMAKE_TOOLCHAIN_FILE=../../firmware/cmake/cortex-m.cmake"),
+        (
+            [f"-DCMAKE_TOOLCHAIN_FILE={FIRMWARE}/cmake/cortex-m.cmake", "-DBSLAM_CORE=m0plus"],
+            "BSLAM_CORE is m0plus; startup.s is for cores with a floating-point unit",
+        ),
+    ],
+)
+def test_stm32_is_not_configured_for_another_core(tmp_path: Path, words: list[str], says: str) -> None:
+    said = run("cmake", "-S", STM32, "-B", tmp_path / "build", *words, folder=tmp_path, expect=1).stderr
+    assert says in " ".join(said.split())
+
+
 def test_arduino_sketch_drives(tmp_path: Path, library: Path) -> None:
     build_arduino(tmp_path, SKETCH, library)
     check_drive(run("./robot", folder=tmp_path).stdout, refused=1)  # a line that is too long
