@@ -63,7 +63,7 @@ static void open_table(struct table *table, const char *folder, const char *name
     snprintf(table->path, sizeof table->path, "%s/%s", folder, name);
     table->file = fopen(table->path, "r");
     require(table->file != NULL && fgets(table->header, sizeof table->header, table->file) != NULL,
-            table->path, "its header", "cannot be read");
+            table->path, "its header", "the file does not exist, or cannot be read");
     strcpy(table->row, table->header);
     for (char *title = strtok(table->row, ",\r\n"); title != NULL; title = strtok(NULL, ",\r\n")) {
         require(field_of(strchr(columns, ' ') + 1, columns, title) != NULL, table->path, title, columns);

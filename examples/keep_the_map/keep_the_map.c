@@ -53,17 +53,10 @@ static bool read_file(const void *file, uint32_t at, void *bytes, uint32_t count
     return fseek((FILE *)file, (long)at, SEEK_SET) == 0 && fread(bytes, 1, count, (FILE *)file) == count;
 }
 
-/// Beside the old map, and in its place once it is whole.
-static bool save(const char *path)
+/// In the file beside the old map, and in its place once it is whole.
+static bool save(FILE *file, const char *beside, const char *path)
 {
-    char beside[512];
     uint32_t bytes = 0;
-    snprintf(beside, sizeof beside, "%s.new", path);
-    FILE *file = fopen(beside, "wb");
-    if (file == NULL) {
-        printf("%s: %s\n", beside, strerror(errno));
-        return false;
-    }
     const bslam_map_sink_t sink = {write_file, file};
     const bslam_status_t status = bslam_save_map(&robot, &sink, &bytes);
     const bool is_closed = fclose(file) == 0;
@@ -111,6 +104,13 @@ int main(int argc, char **argv)
     if (has_map && !load(file, path)) {
         return 1;  // a damaged map is refused as a whole, and the fault says why
     }
+    char beside[512];
+    snprintf(beside, sizeof beside, "%s.new", path);
+    FILE *beside_file = fopen(beside, "wb");
+    if (beside_file == NULL) {  // said before the drive, not after it
+        printf("%s: %s\n", beside, strerror(errno));
+        return 1;
+    }
     const int64_t start_us = has_map ? 7000000 : 0;  // elsewhere on the circle
     bslam_recovery_state_t before = bslam_health(&robot).state;
     printf("at the start: %s\n", states[before]);
@@ -127,5 +127,5 @@ int main(int argc, char **argv)
     const bslam_pose_t pose = bslam_pose(&robot), truth = true_pose(start_us + 30000000);
     printf("at x %.2f m, y %.2f m, %.2f rad; in truth at x %.2f m, y %.2f m, %.2f rad\n", pose.x_m, pose.y_m,
            pose.theta_rad, truth.x_m, truth.y_m, truth.theta_rad);
-    return save(path) ? 0 : 1;
+    return save(beside_file, beside, path) ? 0 : 1;
 }
