@@ -167,10 +167,12 @@ def table_of(rows: Sequence[Sequence[str]]) -> str:
 
 
 def mean_row(name: str, entries: Sequence[dict[str, Any]]) -> list[str]:
-    """Means over the runs that have a figure, lost ones included; the last column counts these."""
-    lost = sum(bool(entry["diverged"]) for entry in entries)
-    mean = _mean_entry(entries)
-    return [name, *(text(mean) for _, text in _COLUMNS[:-1]), f"{lost} lost" if lost else ""]
+    """Means over the runs that have a figure, lost ones included; the last column counts these, and those
+    that gave none."""
+    failed = sum("error" in entry for entry in entries)
+    counts = {"FAILED": failed, "lost": sum(bool(entry["diverged"]) for entry in entries) - failed}
+    mean, said = _mean_entry(entries), ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return [name, *(text(mean) for _, text in _COLUMNS[:-1]), said]
 
 
 def _mean_entry(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def execute(arguments: argparse.Namespace) -> int:
     jobs = jobs_of(arguments)
     result = make_runs(arguments, jobs, _plan(arguments, jobs))
     _name_rows(result, jobs)
-    entries = [*result.entries, *(one.entry for one in result.failed)]
+    entries = result.all_entries
     rows = sorted(row_figures(entries), key=lambda one: list(ROWS).index(one.row))
     text = ""
     if rows:
@@ -127,7 +127,7 @@ def _plan(arguments: argparse.Namespace, jobs: Sequence[Job]) -> dict[str, str]:
 def _name_rows(result: SweepResult, jobs: Sequence[Job]) -> None:
     """Says of each entry which row of which scenario it is."""
     sources = {job.name: job.source for job in jobs}
-    for entry in [*result.entries, *(one.entry for one in result.failed)]:
+    for entry in result.all_entries:
         source = sources[entry["name"]]
         assert isinstance(source, StressSource)
         entry |= {"scenario": Path(source.scenario).stem, "row": source.row}

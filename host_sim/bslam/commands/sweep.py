@@ -120,7 +120,7 @@ def execute(arguments: argparse.Namespace) -> int:
     with contextlib.ExitStack() as stack:
         backend = stack.enter_context(cluster(arguments.cluster)) if arguments.cluster else None
         result = make_runs(arguments, jobs, plan, backend)
-    text = combinations(result.entries) if result.entries else ""
+    text = combinations(result.all_entries) if result.all_entries else ""
     status = finish(result, arguments.out, "sweep.txt", text)
     if jobs_and_plan(arguments)[1] != plan:
         raise BslamError(f"{arguments.scenario}: was changed while its runs were made, which are of before")
@@ -142,16 +142,16 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
 
     `table` is the file of `text`, `more` what else summary.json says.
     """
-    failures = [one.entry for one in result.failed]
     more |= {"interrupted": True} if result.missing else {}
-    write_summary(out, [*result.entries, *failures], **more)
+    write_summary(out, result.all_entries, **more)
     files = ["summary.json", STORE]
     if text:
         write_atomically(out / table, text + "\n")
         files.insert(1, table)
         print(text)
+    if result.all_entries:
+        print(f"verdict: {verdict(result.all_entries)}")
     if result.entries:
-        print(f"verdict: {verdict(result.entries)}")
         try:
             write_parquet(out / PARQUET, result.entries)
             files.insert(0, PARQUET)

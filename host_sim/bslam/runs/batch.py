@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import multiprocessing
 import os
 import signal
 import threading
@@ -226,6 +227,8 @@ def _execute_in_worker(index: int, job: Job, out: Path, parent: int) -> tuple[in
         # Ctrl-C reaches every process of the terminal; the parent alone decides what it means. (Where there
         # are no processes to be had, the parent itself does the work.)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # Processes that an algorithm gets (contest.py) inherit the word, and know nothing of joblib's "loky".
+        multiprocessing.set_start_method("spawn", force=True)
     return index, execute(job, out)
 
 

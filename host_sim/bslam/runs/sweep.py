@@ -53,6 +53,11 @@ class SweepResult:
     kept: int = 0  # of the entries, made by an earlier process
     stopped: str = ""  # why runs are missing
 
+    @property
+    def all_entries(self) -> list[dict[str, Any]]:
+        """Those that failed last."""
+        return [*self.entries, *(one.entry for one in self.failed)]
+
 
 def code_digest() -> str:
     """Of the program: runs of two versions are not one sweep."""

@@ -190,14 +190,15 @@ def test_sweep_with_an_algorithm_makes_its_runs_once_and_names_what_fails(
     lines = ['scenarios = ["short.toml"]', 'seeds = "0:2"', 'association = "known"', "files = false"]
     lines += ['filter = ["standard", "invariant"]', 'with = ["mine_of_sweep:Still"]']
     sweep, out = write(tmp_path / "grid.toml", *lines), tmp_path / "out"
-    assert sweep_into(out, sweep) == 0
+    assert sweep_into(out, sweep, "--jobs", "2") == 0  # whose processes have processes of their own
     found = {run["name"]: run.get("method", run.get("filter")) for run in runs(out)}
     assert sorted(found.values()) == ["Still", "Still", "invariant", "invariant", "standard", "standard"]
     assert [line.count("Still") for line in (out / "sweep.txt").read_text().splitlines()] == [0, 0, 0, 1]
     write(module, STILL.replace("return 0.0, 0.0", "return 1.0 / (self.seed - 1), 0.0"))
     capsys.readouterr()
     assert sweep_into(out, sweep) == 1  # a finished sweep gives way to another version's
-    said = capsys.readouterr().err
+    told, said = capsys.readouterr()
+    assert "  1 FAILED\nverdict: " in told and "error (1)" in told
     assert "Still failed" in said and "ZeroDivisionError" in said and "mine_of_sweep.py" in said
     assert sum("error" in run for run in runs(out)) == 1 and len(runs(out)) == 6
 
