@@ -453,9 +453,13 @@ _COLUMNS = {
 
 
 def _find_csv(folder: Path, stem: str) -> Path | None:
-    found = [path for path in (folder / f"{stem}.csv", folder / f"{stem}.csv.gz") if path.is_file()]
+    names = (f"{stem}.csv", f"{stem}.csv.gz")
+    found = [folder / name for name in names if (folder / name).is_file()]
     if len(found) > 1:
         raise BslamError(f"{folder}: both {stem}.csv and {stem}.csv.gz are there; allowed: one of them")
+    for path in [] if found else folder.iterdir():
+        if path.name.casefold() in names:
+            raise BslamError(f"{path}: is no name of a log's file; allowed: {path.name.casefold()}")
     return found[0] if found else None
 
 
@@ -487,7 +491,12 @@ def _tables_of(frames: Mapping[str, Any]) -> Tables:
         frame = frames[stem]
         if frame is None and stem not in _NEEDED:
             return None
-        return table_of_texts(stem, texts_of(stem, frame), layouts, optional)
+        texts = texts_of(stem, frame)
+        for name in getattr(getattr(frame, "index", None), "names", ()):  # of pandas
+            if name not in texts and any(name in one for one in (*layouts, optional)):
+                allowed = "a column, which reset_index() makes of it"
+                raise BslamError(f"{stem}: {name} is the dataframe's index; allowed: {allowed}")
+        return table_of_texts(stem, texts, layouts, optional)
 
     return read
 
@@ -630,7 +639,8 @@ def read_truth(path: Path, notes: list[str]) -> Truth:
 
 
 def _truth(table: Table, notes: list[str]) -> Truth:
-    table.require_rows("allowed: at least one, or no such file")
+    none = "no such file" if table.origin.is_file else "truth=None"
+    table.require_rows(f"allowed: at least one, or {none}")
     table = _in_order(table, notes, strict=True)
     theta_rad = table.values.get("theta_rad", np.full(table.rows, math.nan))
     return Truth(table.integers("time_us"), table.values["x_m"], table.values["y_m"], wrap_rad(theta_rad))

@@ -375,8 +375,20 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
             {"odometry_csv": "time_us,left_m\n1,2\n"},
             r"odometry\.csv, line 1: columns 'time_us,left_m' .*allowed: time_us,left_m,right_m or ",
         ),
-        ({"odometry_csv": ""}, r"odometry\.csv, line 1: columns ''"),
-        ({"odometry_csv": "time_us,left_m,right_m,left_m\n"}, r"odometry\.csv, line 1"),
+        ({"odometry_csv": ""}, r"odometry\.csv: is empty; allowed: columns time_us,left_m,right_m or "),
+        (
+            {"odometry_csv": "time_us,left_m,right_m,left_m\n"},
+            r"odometry\.csv, line 1.*'left_m' is there twice$",
+        ),
+        (
+            {"odometry_csv": "time_us,left_m,right_m,foo,yaw\n"},
+            r"csv, line 1: .*; not one of them: 'foo', 'yaw'$",
+        ),
+        ({"odometry_csv": ",time_us,left_m,right_m\n"}, r"column 1 has no name: of pandas\? .*index=False"),
+        (
+            {"odometry_csv": "time_us;left_m;right_m\n1;0,5;0,5\n"},
+            r"commas separate columns, not ';', and 0\.5 is written with a point$",
+        ),
         (
             {"sightings_csv": "time_us,beacon_id,range_m\n"},
             r"sightings\.csv, line 1.*perhaps beacon_id,range_m,mappable.*a sighting of range alone cannot",
@@ -519,13 +531,20 @@ def test_read_of_a_table_that_is_there_twice_says_so(tmp_path: Path) -> None:
         Log.read(tmp_path)
 
 
+def test_read_of_a_table_named_in_capitals_says_so(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    (tmp_path / "truth.csv").rename(tmp_path / "Truth.CSV")
+    with pytest.raises(BslamError, match=r"Truth\.CSV: is no name of a log's file; allowed: truth\.csv$"):
+        Log.read(tmp_path)
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"not gzip", gzip.compress(b"time_us")[:-3], gzip.compress(b"\xff\xfe")]
 )
 def test_read_of_a_broken_gzip_file_names_it(tmp_path: Path, content: bytes) -> None:
     write_files(tmp_path, odometry_csv=None)
     (tmp_path / "odometry.csv.gz").write_bytes(content)
-    with pytest.raises(BslamError, match=r"odometry\.csv\.gz(: cannot be read|, line 1)"):
+    with pytest.raises(BslamError, match=r"odometry\.csv\.gz(: cannot be read|, line 1|: is empty)"):
         Log.read(tmp_path)
 
 

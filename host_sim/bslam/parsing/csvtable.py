@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import gzip
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -218,11 +218,26 @@ def _match_layout(
     extra = f" (and perhaps {','.join(optional)})" if optional else ""
     why = "".join(f"; {one.why}" for name, one in layouts[0].items() if one.why and name not in names)
     known = {name for one in (*layouts, optional) for name in one}
-    unknown = next((name for name in names if name not in known), "")
+    if not any(names):
+        where = origin.header if names else origin.name
+        raise BslamError(f"{where}: is empty; allowed: columns {wanted}{extra}")
     raise BslamError(
         f"{origin.header}: columns {','.join(names)!r} are not allowed; allowed: {wanted}{extra}{why}"
-        + did_you_mean(unknown, known - set(names))
+        + _offender(origin, names, known)
     )
+
+
+def _offender(origin: Origin, names: Sequence[str], known: Collection[str]) -> str:
+    """Which of the names is wrong, as far as one alone is, and how to mend it."""
+    if origin.is_file and len(names) == 1 and (found := [one for one in ";\t |" if one in names[0]]):
+        return f"; commas separate columns, not {found[0]!r}, and 0.5 is written with a point"
+    if origin.is_file and "" in names:
+        return f"; column {names.index('') + 1} has no name: of pandas? to_csv(..., index=False)"
+    if unknown := [name for name in names if name not in known]:
+        said = f"; not one of them: {', '.join(map(repr, unknown))}"
+        return said + did_you_mean(unknown[0], set(known) - set(names))
+    twice = next((name for name in names if names.count(name) > 1), None)
+    return f"; {twice!r} is there twice" if twice else ""
 
 
 def _fields(line: str) -> list[str]:

@@ -29,6 +29,7 @@ def texts_of(name: str, frame: Any) -> dict[str, list[str]]:
     except (TypeError, NarwhalsError) as error:
         kind, said = type(frame).__name__, " ".join(str(error).split())
         allowed = "a dataframe of pandas, polars, pyarrow or another library that narwhals knows"
+        allowed += f", as pandas.DataFrame({name})" if isinstance(frame, (dict, list, np.ndarray)) else ""
         raise BslamError(f"{name}: {kind}: {said}; allowed: {allowed}") from error
     for column in eager.columns:
         if not isinstance(column, str):  # pandas numbers them where nobody names them

@@ -116,7 +116,7 @@ def test_what_is_wrong_is_said_as_of_a_file(table, column, change, allowed, tmp_
         ),
         (
             lambda o, s: Log.from_dataframe(o, s.assign(image=1), robot=ROBOT),
-            "sightings: columns .*image",
+            "sightings: columns .*; not one of them: 'image'",
         ),
         (lambda o, s: Log.from_dataframe(o[:0], s, robot=ROBOT), "odometry: no rows below the header"),
         (
@@ -125,7 +125,17 @@ def test_what_is_wrong_is_said_as_of_a_file(table, column, change, allowed, tmp_
         ),
         (
             lambda o, s: Log.from_dataframe(o, {"time_us": [1]}, robot=ROBOT),
-            "sightings: dict: .*allowed: a ",
+            r"sightings: dict: .*allowed: a .*, as pandas\.DataFrame\(sightings\)$",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(o.set_index("time_us"), s, robot=ROBOT),
+            r"^odometry: time_us is the dataframe's index; allowed: a column, which reset_index\(\) makes",
+        ),
+        (
+            lambda o, s: Log.from_dataframe(
+                o, s, robot=ROBOT, truth=pd.DataFrame(columns=["time_us", "x_m", "y_m"])
+            ),
+            "^truth: no rows below the header; allowed: at least one, or truth=None$",
         ),
         (
             lambda o, s: Log.from_dataframe(o, s, robot={}),
