@@ -143,5 +143,5 @@ if __name__ == "__main__":
         sys.exit(f"camera_tags: {error}")
     print("robot: x {:.3f} m, y {:.3f} m, heading {:.3f} rad".format(*slam.pose()))
     for beacon in slam.beacons():
-        sd_m = math.sqrt(max(beacon.covariance[0][0], beacon.covariance[1][1]))
+        sd_m = math.sqrt(max(beacon.covariance_m2[0][0], beacon.covariance_m2[1][1]))
         print(f"tag {beacon.label}: x {beacon.x_m:.3f} m, y {beacon.y_m:.3f} m, sd {sd_m:.3f} m")

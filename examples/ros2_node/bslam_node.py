@@ -133,7 +133,7 @@ class BslamNode(Node):
         """A flat cylinder that holds the beacon with 95 %."""
         marker = Marker(ns="bslam", id=int(beacon.uid % 2**31), type=Marker.CYLINDER, action=Marker.ADD)
         marker.header.stamp, marker.header.frame_id = stamp, "map"
-        long_m, short_m, yaw_rad = ellipse_95(beacon.covariance)
+        long_m, short_m, yaw_rad = ellipse_95(beacon.covariance_m2)
         _place(marker.pose.position, marker.pose.orientation, beacon.x_m, beacon.y_m, yaw_rad)
         marker.scale.x, marker.scale.y, marker.scale.z = max(long_m, 0.01), max(short_m, 0.01), 0.02
         marker.color.g, marker.color.a = (1.0 if beacon.confirmed else 0.4), 0.7

@@ -79,7 +79,7 @@ class Bslam:
     def map(self) -> Sequence[Landmark]:
         """The confirmed beacons."""
         return [
-            Landmark(one.x_m, one.y_m, one.label if one.label >= 0 else None, one.covariance, one.uid)
+            Landmark(one.x_m, one.y_m, one.label if one.label >= 0 else None, one.covariance_m2, one.uid)
             for one in self._slam.beacons()
             if one.confirmed
         ]

@@ -93,14 +93,14 @@ def _show(path: Path, out: Path) -> None:
     rows = [["uid", "label", "kind", "class", "x m", "y m", "sd m", "scale", "sightings", "machine"]]
     mapped = []
     for one, seen in zip(kept.beacons, slam.beacons(), strict=True):
-        sd_m = math.sqrt(max(float(np.trace(seen.covariance)), 0.0))
+        sd_m = math.sqrt(max(float(np.trace(seen.covariance_m2)), 0.0))
         label = str(one.label) if one.label >= 0 else "-"
         machine = "-" if one.machine is None else str(one.machine)
         scale = f"{one.scale:.2f}" if one.scale else "-"
         place = [f"{one.x_m:.2f}", f"{one.y_m:.2f}", f"{sd_m:.2f}"]
         words = [str(one.uid), label, one.kind, str(one.beacon_class or "-")]
         rows.append([*words, *place, scale, str(one.sightings), machine])
-        mapped.append(Mapped(one.x_m, one.y_m, seen.covariance, True, "" if one.label < 0 else label))
+        mapped.append(Mapped(one.x_m, one.y_m, seen.covariance_m2, True, "" if one.label < 0 else label))
     print(table_of(rows))
     room = Room(f"{path.name}: {len(kept.beacons)} beacons", np.zeros((1, 2)), mapped=mapped)
     picture = out / f"{path.stem}.png"

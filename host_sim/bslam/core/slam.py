@@ -69,7 +69,7 @@ class Account:
 class Beacon:
     """A beacon of the map.
 
-    Position in m in the start pose's frame; covariance (2, 2) float64 in m²; polar from the start.
+    Position in m in the start pose's frame; covariance_m2 (2, 2) float64; polar from the start.
     """
 
     uid: int
@@ -79,7 +79,7 @@ class Beacon:
     sightings: int
     x_m: float
     y_m: float
-    covariance: NDArray[np.float64]
+    covariance_m2: NDArray[np.float64]
     range_m: float
     phi_rad: float
 
@@ -359,7 +359,7 @@ class Slam:
                     sightings=view.sightings,
                     x_m=view.x_m,
                     y_m=view.y_m,
-                    covariance=covariance,
+                    covariance_m2=covariance,
                     range_m=view.range_m,
                     phi_rad=view.phi_rad,
                 )

@@ -223,13 +223,14 @@ def _state_from(content: Json) -> State:
 def _map_to(one: Map) -> Json:
     rows = []
     for beacon in one.beacons:
-        words = {name: value for name, value in vars(beacon).items() if name != "covariance"}
-        rows.append(words | {"covariance": beacon.covariance.tolist()})
+        words = dict(vars(beacon))
+        rows.append(words | {"covariance": words.pop("covariance_m2").tolist()})
     return {"beacons": rows}
 
 
 def _map_from(content: Json) -> Map:
-    return Map([Beacon(**row | {"covariance": np.array(row["covariance"])}) for row in content["beacons"]])
+    rows = [dict(row) for row in content["beacons"]]
+    return Map([Beacon(covariance_m2=np.array(row.pop("covariance")), **row) for row in rows])
 
 
 def _true_pose_to(one: TruePose) -> Json:

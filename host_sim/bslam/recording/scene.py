@@ -40,7 +40,7 @@ def map_scene(log_ns: int, beacons: list[Beacon]) -> Json:
 
 
 def _entity(log_ns: int, beacon: Beacon) -> Json:
-    variance, axes = np.linalg.eigh(beacon.covariance)
+    variance, axes = np.linalg.eigh(beacon.covariance_m2)
     sd_m = np.sqrt(np.maximum(variance, 0.0))
     width_m = [max(2.0 * SIGMAS * float(one), _LEAST_SIZE_M) for one in sd_m]
     direction_rad = math.atan2(axes[1, 0], axes[0, 0])

@@ -295,5 +295,5 @@ def _told(time_s: float, bearing_rad: float, range_m: float, true_id: int, accou
 
 
 def _spot(beacon: Any) -> Spot:
-    place = (beacon.x_m, beacon.y_m, np.asarray(beacon.covariance, dtype=np.float64))
+    place = (beacon.x_m, beacon.y_m, np.asarray(beacon.covariance_m2, dtype=np.float64))
     return Spot(beacon.uid, beacon.label, *place, beacon.sightings, beacon.confirmed)

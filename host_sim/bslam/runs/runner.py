@@ -362,7 +362,7 @@ def _map_beacon(beacon: Any, ledger: Ledger) -> MapBeacon:
         true_id=ledger.identity(beacon.uid),
         x_m=beacon.x_m,
         y_m=beacon.y_m,
-        covariance_m2=np.array(beacon.covariance, dtype=np.float64),
+        covariance_m2=np.array(beacon.covariance_m2, dtype=np.float64),
         sightings=beacon.sightings,
         confirmed=beacon.confirmed,
         range_m=beacon.range_m,

@@ -238,7 +238,7 @@ class RemoteSlam:
             sightings=raw.sightings,
             x_m=raw.x_m,
             y_m=raw.y_m,
-            covariance=np.array([[xx, xy], [xy, yy]]),
+            covariance_m2=np.array([[xx, xy], [xy, yy]]),
             range_m=raw.range_m,
             phi_rad=raw.phi_rad,
         )

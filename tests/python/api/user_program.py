@@ -17,7 +17,7 @@ def drive_one_robot() -> tuple[float, float, float]:
     slam.odometry("wheels", 40_000, 0.02, 0.02)
     accounts = slam.sightings(40_000, np.array([0.3]), (3.1,), [7], [True])
     assert_type(accounts[0].beacon_uid, int | None)
-    assert_type(slam.beacons()[0].covariance, NDArray[np.float64])
+    assert_type(slam.beacons()[0].covariance_m2, NDArray[np.float64])
     try:
         slam.odometry("wheels", 40_000, 0.02, 0.02)
     except CoreError as refusal:

@@ -169,7 +169,7 @@ def test_playground_state_is_the_hosts_to_the_bit(functions, choices):
     assert (pose["x"], pose["y"], pose["theta"]) == slam.pose()
     assert tuple(pose["lower"]) == slam.pose_covariance_lower()
     host = [
-        (one.uid, one.label, one.x_m, one.y_m, *one.covariance[[0, 0, 1], [0, 1, 1]])
+        (one.uid, one.label, one.x_m, one.y_m, *one.covariance_m2[[0, 0, 1], [0, 1, 1]])
         for one in slam.beacons()
     ]
     names = ("uid", "label", "x", "y", "xx", "xy", "yy")

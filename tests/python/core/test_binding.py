@@ -298,18 +298,18 @@ def test_beacons_are_those_of_the_state() -> None:
     known, *others = slam.beacons()
     assert (known.kind, known.label, known.confirmed) == ("known", 99, True)
     assert (known.range_m, known.phi_rad) == pytest.approx((5.0, math.atan2(4, -3)))
-    assert not known.covariance.any()
+    assert not known.covariance_m2.any()
     mean, p = instance.mean(slam), instance.covariance(slam)
     at = 5
     for beacon in others:
         if beacon.kind == "point":
             assert (beacon.x_m, beacon.y_m) == tuple(mean[at : at + 2])
-            assert np.allclose(beacon.covariance, p[at : at + 2, at : at + 2], rtol=1e-9, atol=1e-15)
+            assert np.allclose(beacon.covariance_m2, p[at : at + 2, at : at + 2], rtol=1e-9, atol=1e-15)
         else:
             x, y, direction, inverse = mean[at : at + 4]
             expected = (x + math.cos(direction) / inverse, y + math.sin(direction) / inverse)
             assert (beacon.x_m, beacon.y_m) == pytest.approx(expected, abs=1e-12)
-            assert (np.linalg.eigvalsh(beacon.covariance) > 0).all()
+            assert (np.linalg.eigvalsh(beacon.covariance_m2) > 0).all()
         at += 2 if beacon.kind == "point" else 4
     assert at == instance.dim(slam)
     assert {beacon.kind for beacon in others} == {"point", "ray"}

@@ -156,5 +156,5 @@ def refused_and_the_same(call: Callable[..., object], bad: object) -> None:
 
 def without_counters(slam: Slam) -> tuple[object, ...]:
     """All that a refusal must leave as it was."""
-    beacons = [(one.uid, one.x_m, one.y_m, one.covariance.tolist()) for one in slam.beacons()]
+    beacons = [(one.uid, one.x_m, one.y_m, one.covariance_m2.tolist()) for one in slam.beacons()]
     return slam.pose(), slam.pose_covariance_lower(), beacons, slam.params

@@ -85,7 +85,7 @@ def places_of(slam):
 
 
 def sd_of_places(slam):
-    return np.array([np.sqrt(np.diag(one.covariance)) for one in slam.beacons()])
+    return np.array([np.sqrt(np.diag(one.covariance_m2)) for one in slam.beacons()])
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -209,7 +209,7 @@ def test_robot_that_only_turns_does_not_learn_distances():
     assert np.all(np.linalg.eigvalsh(slam.pose_covariance()) > 0.0)
     along = PLACES / np.hypot(*PLACES.T)[:, None]
     for beacon, u in zip(slam.beacons(), along, strict=True):
-        assert u @ beacon.covariance @ u > 1.0**2, "nothing tells how far it is"
+        assert u @ beacon.covariance_m2 @ u > 1.0**2, "nothing tells how far it is"
 
 
 def test_robot_that_stands_stays_finite():

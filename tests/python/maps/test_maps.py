@@ -69,7 +69,7 @@ def test_the_bytes_are_what_the_library_writes(params):
     slam.load_map(blob)
     for one, place, seen in zip(kept.beacons, kept.places(), slam.beacons(), strict=True):
         assert kept.values[place][:2].tolist() == [seen.x_m, seen.y_m]
-        assert np.allclose(kept.covariance[place, place][:2, :2], seen.covariance, rtol=1e-5, atol=0)
+        assert np.allclose(kept.covariance[place, place][:2, :2], seen.covariance_m2, rtol=1e-5, atol=0)
         assert one.kind == seen.kind
 
 

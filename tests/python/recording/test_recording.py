@@ -93,7 +93,7 @@ beacons = st.builds(
     sightings=st.integers(0, 9),
     x_m=floats,
     y_m=floats,
-    covariance=st.just(np.array([[0.1, 0.01], [0.01, 0.3]])),
+    covariance_m2=st.just(np.array([[0.1, 0.01], [0.01, 0.3]])),
     range_m=floats,
     phi_rad=floats,
 )
