@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bslam.algorithms import Algorithm, Setup
-from bslam.errors import BslamError
+from bslam.errors import BslamError, did_you_mean
 
 OURS: Final = "bslam"
 BOUND: Final = "map"
@@ -121,20 +121,29 @@ def load_method(method: Method) -> Callable[[Setup], Algorithm]:
     module = _load_file(Path(place)) if place.endswith(".py") else _load_module(place)
     made = getattr(module, name, None)
     if not callable(made):
-        classes = [word for word, one in vars(module).items() if inspect.isclass(one)]
+        classes = [word for word, one in vars(module).items() if inspect.isclass(one) and not _lacks(one)]
         there = ", ".join(classes) or "none"
-        raise BslamError(f"{place} has no class {name}; allowed: those that it has, {there}")
+        allowed = f"those with the methods of docs/PLUGIN.md: {there}{did_you_mean(name, classes)}"
+        raise BslamError(f"{place} has no class {name}; allowed: {allowed}")
     return maker_of(made, **dict(method.settings))
 
 
 def maker_of(made: Callable[..., Algorithm], **settings: Any) -> Callable[[Setup], Algorithm]:
     """What makes the algorithm of a class from its setup. Raises BslamError for what is no such class."""
-    name = getattr(made, "__name__", repr(made))
-    missing = [word for word in ("reset", "odometry", "observe", "pose", "map") if not hasattr(made, word)]
-    if missing:
-        raise BslamError(f"{name} has no {', '.join(missing)}; allowed: a class as in docs/PLUGIN.md")
+    if not isinstance(made, type):
+        said = repr(made) if isinstance(made, str) else f"of type {type(made).__name__}"
+        raise BslamError(f"algorithm {said}: is no class; allowed: the class itself, log.run(MySlam) say")
+    if missing := _lacks(made):
+        raise BslamError(
+            f"{made.__name__} has no {', '.join(missing)}; allowed: a class as in docs/PLUGIN.md"
+        )
     takes_setup = bool(inspect.signature(made).parameters)
     return (lambda setup: made(setup, **settings)) if takes_setup else (lambda setup: made(**settings))
+
+
+def _lacks(made: object) -> list[str]:
+    """Methods that an algorithm needs and this has not."""
+    return [word for word in ("reset", "odometry", "observe", "pose", "map") if not hasattr(made, word)]
 
 
 def _load_module(name: str) -> Any:

@@ -24,6 +24,9 @@ from bslam.runs.runner import MAPPABLE, Frames, beacons_to_hold
 STANDS_FOR_M = 1.0
 """A landmark without a label stands for the true beacon nearest to it, if that is nearer than this."""
 
+_ROUNDING = 1e-3
+"""Of a correlation: so little below 0, or uneven, is a filter's rounding."""
+
 
 class AlgorithmError(BslamError):
     """An algorithm said something that cannot be: which call, at which step, and what is allowed."""
@@ -161,10 +164,12 @@ class _Drive:
 
     def finish(self) -> Trace:
         """The trace of the drive."""
+        covariance = np.array(self._covariances, dtype=np.float64)
+        _require_covariances(covariance)
         return Trace(
             time_us=np.array(self._times_us, dtype=np.int64),
             pose=np.array(self._poses, dtype=np.float64),
-            covariance=np.array(self._covariances, dtype=np.float64),
+            covariance=covariance,
             seen=np.array(self._seen, dtype=np.bool_),
             counts=self._ledger.counts() if self._tells else SightingCounts(self._sightings, told=False),
             beacons=tuple(self._map()),
@@ -211,6 +216,19 @@ class _Drive:
         distance_m = np.hypot(beacons.x_m - x_m, beacons.y_m - y_m)
         nearest = int(np.argmin(distance_m))
         return int(beacons.beacon_id[nearest]) if distance_m[nearest] < STANDS_FOR_M else -1
+
+
+def _require_covariances(covariance: NDArray[np.float64]) -> None:
+    """Raise AlgorithmError for the first (n, 3, 3) that is none, beyond rounding; NaN says nothing."""
+    sd = np.sqrt(np.abs(np.diagonal(covariance, axis1=1, axis2=2)))
+    sd[sd == 0.0] = 1.0
+    scaled = covariance / (sd[:, :, None] * sd[:, None, :])
+    rows = np.flatnonzero(np.isfinite(scaled).all(axis=(1, 2)))
+    uneven = np.abs(scaled[rows] - scaled[rows].transpose(0, 2, 1)).max(axis=(1, 2))
+    bad = rows[(uneven > _ROUNDING) | (np.linalg.eigvalsh(scaled[rows])[:, 0] < -_ROUNDING)]
+    if len(bad):
+        said = f"pose_covariance() returned {covariance[bad[0]].tolist()} at step {bad[0]}"
+        raise AlgorithmError(f"{said}; allowed: a symmetric matrix without an eigenvalue below 0")
 
 
 def _as_sightings(columns: list[Any]) -> list[Sighting]:

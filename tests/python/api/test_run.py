@@ -113,6 +113,9 @@ def test_an_algorithm_of_ones_own_is_judged_alike() -> None:
     assert named.summary["association"] == "known"
     with pytest.raises(BslamError, match="Half has no observe, map; allowed: a class as in"):
         DRIVE.run(type("Half", (), {"reset": 0, "odometry": 0, "pose": 0}))
+    for one, said in ((Standstill(), "of type Standstill"), ("mine:Standstill", "'mine:Standstill'")):
+        with pytest.raises(BslamError, match=rf"^algorithm {said}: is no class; allowed: the class itself"):
+            DRIVE.run(one)
 
 
 @pytest.mark.parametrize(

@@ -282,9 +282,10 @@ def test_own_method_that_is_not_there_is_named(text, parts):
 
 def test_class_that_is_not_there_or_lacks_methods_is_named(tmp_path):
     file = tmp_path / "mine.py"
-    file.write_text("class Half:\n    def reset(self, seed): pass\n")
-    with pytest.raises(BslamError, match=r"no class Whole; allowed: .*Half"):
-        load_method(own_method(f"{file}:Whole"))
+    whole = "".join(f"    {one} = print\n" for one in ("reset", "odometry", "observe", "pose", "map"))
+    file.write_text(f"class Half:\n    def reset(self, seed): pass\nclass Whole:\n{whole}")
+    with pytest.raises(BslamError, match=r"no class Whale; allowed: .*: Whole; did you mean 'Whole'\?$"):
+        load_method(own_method(f"{file}:Whale"))
     with pytest.raises(BslamError, match="has no odometry, observe, pose, map"):
         load_method(own_method(f"{file}:Half"))
 
@@ -296,6 +297,18 @@ def test_map_of_something_else_is_named(made, returned, said):
             return returned
 
     with pytest.raises(AlgorithmError, match=rf"map\(\) returned .*; allowed: {said}"):
+        told(made.circle_log(3), RunOptions(), Strange)
+
+
+@pytest.mark.parametrize(
+    "returned", [-np.eye(3), np.diag([1.0, 1.0, -1e-6]), [[1, 2, 0], [2, 1, 0], [0, 0, 1]], np.tri(3)]
+)
+def test_covariance_that_is_none_is_named_with_its_step(made, returned):
+    class Strange(Scribe):
+        def pose_covariance(self):
+            return returned if len(self.calls) > 6 else np.zeros((3, 3))
+
+    with pytest.raises(AlgorithmError, match=r"pose_covariance\(\) returned .* at step 3; allowed: a sym"):
         told(made.circle_log(3), RunOptions(), Strange)
 
 
