@@ -31,6 +31,7 @@ WINDOW_S: Final = 50.0  # "first" and "last" 50 s
 NEES_FIRST_STEP: Final = 51  # by then the pose covariance has left its start value of 0
 DIVERGED_ERROR_M: Final = 2.0
 DIVERGED_STEPS: Final = 1000  # at the end of the run
+_NEES_ABSURD: Final = 1e4  # errors 60 times as large as claimed
 BEACON_SIGHTINGS: Final = 4  # a true beacon counts if it was sighted at least so often
 
 
@@ -123,7 +124,7 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
             entry["map_one_to_one"] = _map_one_to_one(log, trace, evaluation)
     entry["failed_by"] = _failures(entry, evaluation)
     entry["failed"] = bool(entry["failed_by"])
-    notes = notes_on(log, trace, options) + (_of_early_nees(trace, evaluation) if evaluation else [])
+    notes = notes_on(log, trace, options) + (_of_nees(trace, evaluation) if evaluation else [])
     return entry | {"notes": notes, "problems": problems_of(log, trace, options)}
 
 
@@ -235,6 +236,16 @@ def _nees(
     result = np.full(len(rows), np.nan)
     result[rows] = nees(trace.pose[rows], truth[rows], trace.covariance[rows], options.filter)
     return result
+
+
+def _of_nees(trace: Trace, evaluation: Evaluation) -> list[str]:
+    """Notes where NEES is beyond all measure, or of the alignment."""
+    known = evaluation.nees[np.isfinite(evaluation.nees)]
+    mean = float(known.mean()) if len(known) else 0.0
+    early = _of_early_nees(trace, evaluation)
+    if early or mean < _NEES_ABSURD:
+        return early
+    return [f"NEES {mean:.3g} for 3: the filter is sure of what is wrong; is the noise that it is told 0?"]
 
 
 def _of_early_nees(trace: Trace, evaluation: Evaluation) -> list[str]:

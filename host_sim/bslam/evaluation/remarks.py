@@ -84,6 +84,8 @@ def _of_odometry(log: Log, options: RunOptions) -> list[str]:
 
 
 def _of_identities(log: Log, options: RunOptions) -> list[str]:
+    if len(log.sightings.time_us) == 0:
+        return ["there is no sighting: nothing but odometry tells where the robot is"]
     nameless = int((log.sightings.beacon_id[log.sightings.mappable] < 0).sum())
     if nameless <= _MANY * len(log.sightings.time_us):
         return []

@@ -98,6 +98,16 @@ def test_nees_starts_at_step_51(made, log):
     assert entry["nees_inside_95"] == pytest.approx(1.0 - 100 / scored)
 
 
+def test_a_filter_that_is_sure_of_what_is_wrong_has_it_said(made, log):
+    poses = true_poses(log)
+    poses[:, 0] += 0.1
+    sure = made.trace(poses, step_times_us(log), covariance=np.tile(1e-8 * np.eye(3), (STEPS + 1, 1, 1)))
+    assert any(one.startswith("NEES 1e+06 for 3: the filter is sure") for one in figures(log, sure)["notes"])
+    assert not any(
+        one.startswith("NEES") for one in figures(log, made.trace(poses, step_times_us(log)))["notes"]
+    )
+
+
 def test_dead_reckoning_is_odometry_alone(made):
     log = made.circle_log(steps=500, seed=3)
     poses = true_poses(log)

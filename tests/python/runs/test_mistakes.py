@@ -110,6 +110,11 @@ def test_log_without_identities_names_the_methods_that_need_none(capsys, tmp_pat
     assert needs_none in "".join(capsys.readouterr())
 
 
+def test_log_without_sightings_says_that_odometry_is_alone() -> None:
+    nothing = {name: None if one is None else one[:0] for name, one in vars(LOG.sightings).items()}
+    assert "nothing but odometry tells where" in str(with_sightings(LOG, **nothing).run())
+
+
 def in_nanoseconds(log: Log) -> Log:
     """Both tables, as ROS stamps them."""
     late = with_sightings(log, time_us=1000 * log.sightings.time_us)
