@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from bslam.view.style import mean_over_runs, moving_mean, new_figure, tidy
@@ -38,6 +39,9 @@ def draw_comparison(title: str, contenders: Sequence[Contender]) -> Figure:
         style = {"linestyle": "--", "linewidth": 1.6} if one.dashed else {"linewidth": 1.4}
         axes.plot(one.time_s[1:], shown, color=colour, label=label, **style)
     axes.set_yscale("log")
+    axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_title(title, fontsize=11, parse_math=False)
     tidy(axes, "time, s", "position error, cm")
     axes.legend(fontsize=8, frameon=False, ncols=2)

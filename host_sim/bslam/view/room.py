@@ -77,7 +77,7 @@ def draw_room_in(axes: Any, room: Room) -> None:
     axes.set_xlim(low_m[0], high_m[0])
     axes.set_ylim(low_m[1], high_m[1])
     tidy(axes, "x, m", "y, m")
-    axes.set_title(room.title, fontsize=11, parse_math=False)
+    axes.set_title(room.title + _what_is_cut(room, low_m, high_m), fontsize=11, parse_math=False)
 
 
 def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:
@@ -148,16 +148,32 @@ def _extent(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         true.append(room.truth_m[np.isfinite(room.truth_m[:, 0])])
     if room.beacons is not None:
         true.append(np.column_stack([room.beacons.x_m, room.beacons.y_m]))
-    shown_m = room.estimate_m
-    if room.beacons is None:  # else the true ones are what is to be seen
-        mapped_m = [(one.x_m, one.y_m) for one in room.mapped if one.confirmed]
-        shown_m = np.concatenate([shown_m, np.reshape(mapped_m, (-1, 2))])
+    lowest_m, highest_m = _reaches(room)
+    shown_m = np.concatenate([room.estimate_m, lowest_m, highest_m])
     points = np.concatenate(true)
     if len(points) == 0:
-        points = shown_m
+        points = np.concatenate([room.estimate_m, 0.5 * (lowest_m + highest_m)])
     low_m, high_m = points.min(axis=0), points.max(axis=0)
     margin_m = _LOST_MARGIN * max(float(np.max(high_m - low_m)), 1.0)
     low_m = np.maximum(np.minimum(low_m, shown_m.min(axis=0)), low_m - margin_m)
     high_m = np.minimum(np.maximum(high_m, shown_m.max(axis=0)), high_m + margin_m)
     edge_m = max(0.4, _EDGE * float(np.max(high_m - low_m)))  # of stars and their numbers at a wall
     return low_m - edge_m, high_m + edge_m
+
+
+def _reaches(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest x, y of each confirmed beacon's ellipse, (b, 2) both."""
+    confirmed = [one for one in room.mapped if one.confirmed]
+    places_m = np.reshape([(one.x_m, one.y_m) for one in confirmed], (-1, 2))
+    unknown = np.zeros((2, 2))
+    covariances = [unknown if one.covariance_m2 is None else one.covariance_m2 for one in confirmed]
+    variances = np.reshape([np.diagonal(one) for one in covariances], (-1, 2))
+    half_m = _SIGMAS * np.sqrt(np.maximum(np.nan_to_num(variances), 0.0))
+    return places_m - half_m, places_m + half_m
+
+
+def _what_is_cut(room: Room, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> str:
+    """What the title says where the picture is not large enough for the map."""
+    lowest_m, highest_m = _reaches(room)
+    cut = int(((lowest_m < low_m) | (highest_m > high_m)).any(axis=1).sum())
+    return f"; {cut} of {len(lowest_m)} mapped beacons reach beyond the picture" if cut else ""

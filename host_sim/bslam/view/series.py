@@ -37,7 +37,7 @@ class Series:
     error_m: NDArray[Any]  # (runs, n), NaN where it is not known
     nees: NDArray[Any]  # (runs, n), NaN where there is none
     nees_band: tuple[float, float]  # holds 95 % of a consistent filter's NEES, averaged over the runs
-    window_s: float  # the means of this long at both ends are drawn; of half the run, if that is less
+    window_s: float  # the means of this long at both ends are drawn, as the table has them
 
 
 def draw_run(series: Series) -> Figure:
@@ -87,9 +87,9 @@ def draw_error(axes: Any, series: Series) -> None:
     mean_cm = mean_over_runs(error_cm)
     if several:
         axes.plot(time_s, mean_cm, color=ESTIMATE, linewidth=1.6, label=f"mean of {len(error_cm)} runs")
-    window_s = min(series.window_s, 0.5 * float(time_s[-1] - time_s[0]))
-    _draw_window(axes, time_s, mean_cm, time_s <= time_s[0] + window_s, f"first {window_s:.3g} s", "-")
-    _draw_window(axes, time_s, mean_cm, time_s > time_s[-1] - window_s, f"last {window_s:.3g} s", "--")
+    window_s = series.window_s
+    _draw_window(axes, time_s, mean_cm, time_s <= time_s[0] + window_s, f"first {window_s:g} s", "-")
+    _draw_window(axes, time_s, mean_cm, time_s > time_s[-1] - window_s, f"last {window_s:g} s", "--")
     axes.set_ylim(0.0, _TOP * _highest_cm(series))
     axes.set_xlim(float(time_s[0]), float(time_s[-1]))
     tidy(axes, "time, s", "position error, cm")

@@ -73,6 +73,30 @@ def test_room_is_not_shrunk_by_an_estimate_that_got_lost(made):
     assert figure.axes[0].get_xlim()[1] < 15.0
 
 
+@pytest.mark.parametrize("true", [True, False])
+def test_room_holds_what_is_mapped_unless_that_is_far_too_unsure(made, true):
+    beacons = made.beacons if true else None
+    off = Mapped(6.0, 0.0, np.diag([0.25, 0.01]), True)  # to 7 m
+    axes = draw_room(Room("a room", PATH, PATH, beacons, [off])).axes[0]
+    assert axes.get_xlim()[1] > 7.0 and axes.get_title() == "a room"
+    unsure = Mapped(6.0, 0.0, np.diag([1e6, 0.01]), True)
+    axes = draw_room(Room("a room", PATH, PATH if true else None, beacons, [off, unsure])).axes[0]
+    assert axes.get_xlim()[1] < 20.0
+    assert axes.get_title() == "a room; 1 of 2 mapped beacons reach beyond the picture"
+
+
+def test_comparison_has_plain_numbers_at_its_scale():
+    time_s = np.arange(100.0)
+    figure = draw_comparison(
+        "two", [Contender("one", time_s, np.full((1, 100), one)) for one in (0.02, 0.04)]
+    )
+    figure.axes[0].set_ylim(1.5, 5.5)
+    pixels(figure)
+    axis = figure.axes[0].yaxis
+    shown = [one.label1.get_text() for one in [*axis.get_major_ticks(), *axis.get_minor_ticks()]]
+    assert {"2", "5"} <= {*shown} and not any("mathdefault" in one for one in shown)
+
+
 def test_run_shows_the_means_at_both_ends():
     figure = draw_run(series(steps=3000))
     pixels(figure)
@@ -82,9 +106,9 @@ def test_run_shows_the_means_at_both_ends():
     assert any("95 % band, 0.2 to 9.3" in name for name in texts(figure.axes[1]))
 
 
-def test_a_short_run_is_halved_for_the_means_at_its_ends():
+def test_a_short_run_has_the_means_that_the_table_has():
     names = texts(draw_run(series(steps=1001)).axes[0])
-    assert [name.split(":")[0] for name in names[1:]] == ["first 20 s", "last 20 s"]
+    assert [name.split(":")[0] for name in names[1:]] == ["first 50 s", "last 50 s"]
 
 
 def test_legend_of_nees_lies_above_the_curve():
