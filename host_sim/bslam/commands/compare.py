@@ -21,6 +21,7 @@ from bslam.commands.arguments import (
     scenario_source,
 )
 from bslam.commands.report import table_of
+from bslam.datasets.datasets import near_folder
 from bslam.errors import BslamError, did_you_mean
 from bslam.options import RunOptions
 from bslam.runs.contest import ContestResult, hold_contest, make_bouts, means
@@ -29,7 +30,7 @@ from bslam.runs.output import write_atomically, write_json, write_summary
 from bslam.runs.sources import FolderSource, Source
 from bslam.view.comparison import Contender, draw_comparison
 from bslam.view.style import png
-from bslam.world.simulate import load_scenario
+from bslam.world.simulate import load_scenario, scenario_names
 
 SUMMARY = "several SLAM algorithms on the same drives, yours among them"
 EXAMPLES = """examples:
@@ -37,8 +38,10 @@ EXAMPLES = """examples:
   bslam compare paper_room --with my_slam:MySlam
   bslam compare paper_room --with my_slam.py:MySlam --only bslam,map --sigma 0.6 --seeds 0:8
   bslam compare out/run/paper_room_seed0 --association known
+  bslam compare recordings/* --with my_slam:MySlam
 
-SCENARIO is a name, the path of a TOML file, or a log folder, which `bslam run --record` leaves.
+SCENARIO is a name or the path of a TOML file; or log folders, which `bslam run --record` leaves, a drive
+each, of which --seeds only changes what is drawn: identities of known:RATE, and what reset(seed) draws.
 
 --with names a class by module (found from the working directory, or installed) or by file; docs/PLUGIN.md
 says what it must offer. Without --only all that are installed run: bslam, dead_reckoning, map (the exact
@@ -47,13 +50,16 @@ The table's ratio is to the map at the steps at which that is solved. compare.js
 the runs, compare.png the errors over time."""
 
 PICTURE = "compare.png"
+_NAMED = 3
 TOLD = (BOUND, "isam2")
 """Those that cannot do without identities."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name, path of a TOML file, or a log folder")
+    parser.add_argument(
+        "drives", nargs="+", metavar="SCENARIO", help="name, or path of a TOML file; or log folders"
+    )
     group = add_algorithm_options(parser)
     group.add_argument("--only", metavar="NAME,...", help="of those that come with bslam, only these")
     group.add_argument(
@@ -75,8 +81,11 @@ def execute(arguments: argparse.Namespace) -> int:
             option = f"--{word.replace('_', '-')}"
             raise BslamError(f"{option}: not where algorithms are compared; allowed: with run and replay")
     methods, options, result, lines = compare(arguments)
-    _write(arguments, result, methods, lines)
-    return _say(arguments, result, lines, options[0])
+    files = _write(arguments, result, methods, lines)
+    _print_table(arguments, lines, options[0])
+    print(f"files in {arguments.out}: {', '.join(files)}, NAME.estimate.tum, NAME.map.csv")
+    _say_failures(result)
+    return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
 
 
 def compare(
@@ -141,12 +150,9 @@ def _named(shipped: Sequence[Method], only: str) -> list[Method]:
 
 
 def _drives(arguments: argparse.Namespace) -> tuple[list[Source], list[RunOptions]]:
-    if Path(arguments.scenario).is_dir():
-        source = FolderSource(Path(arguments.scenario).absolute())
-        options = [
-            run_options(arguments, says=source.says, sensor="recorded", seed=seed) for seed in arguments.seeds
-        ]
-        return [source] * len(options), options
+    if all(Path(word).is_dir() for word in arguments.drives):
+        return _logs(arguments, [Path(word).absolute() for word in arguments.drives])
+    arguments.scenario = _scenario(arguments.drives)
     wheels = load_scenario(arguments.scenario).wheels
     sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
     noise = arguments.noise or wheels.noise
@@ -156,17 +162,43 @@ def _drives(arguments: argparse.Namespace) -> tuple[list[Source], list[RunOption
     return [scenario_source(arguments, seed, sigma_mps, noise) for seed in arguments.seeds], options
 
 
+def _logs(arguments: argparse.Namespace, folders: Sequence[Path]) -> tuple[list[Source], list[RunOptions]]:
+    names = [folder.resolve().name for folder in folders]
+    for row, folder in enumerate(folders):
+        if names[row] in names[:row]:
+            raise BslamError(f"{folder}: another log has its name; allowed: folders of different names")
+    pairs = [
+        (source, run_options(arguments, says=says, sensor="recorded", seed=seed))
+        for source in map(FolderSource, folders)
+        for says in [source.says]
+        for seed in arguments.seeds
+    ]
+    return [source for source, _ in pairs], [one for _, one in pairs]
+
+
+def _scenario(words: Sequence[str]) -> str:
+    """The one word, which is no folder. Raises BslamError for several, and for a folder that is not there."""
+    odd = next(word for word in words if not Path(word).is_dir())
+    named = odd in scenario_names() or odd.endswith(".toml")
+    near = None if named or Path(odd).exists() else near_folder(odd)
+    if len(words) > 1 or near is not None:
+        said = f"; did you mean {str(near)!r}?" if near else ""
+        raise BslamError(f"{odd}: is no log folder; allowed: paths of log folders, or one SCENARIO{said}")
+    return odd
+
+
 def _write(
     arguments: argparse.Namespace,
     result: ContestResult,
     methods: Sequence[Method],
     lines: Sequence[dict[str, Any]],
-) -> None:
-    out = arguments.out
+) -> list[str]:
+    """The files of all runs; their names."""
+    out, drives = arguments.out, " ".join(arguments.drives)
     more = {"interrupted": True} if result.interrupted else {}
     write_summary(out, [outcome.entry for _, outcome in result.outcomes], **more)
     about = {
-        "scenario": arguments.scenario,
+        "scenario": drives,
         "seeds": [arguments.seeds.start, arguments.seeds.stop],
         "bound": BOUND,
         "bound_every_steps": arguments.map_every,
@@ -175,10 +207,15 @@ def _write(
     write_json(out / "compare.json", {"schema": 1, **about, "methods": list(lines), **more})
     picture = out / PICTURE
     picture.unlink(missing_ok=True)  # of an earlier run
+    files = ["compare.json", "summary.json"]
     if arguments.pictures > 0 and (shown := _contenders(result, methods, arguments.map_every)):
-        drives = len(arguments.seeds)
-        title = f"{Path(arguments.scenario).stem}, {f'mean of {drives} drives' if drives > 1 else '1 drive'}"
+        count = len(arguments.drives) * len(arguments.seeds)
+        names = ", ".join(Path(word).stem for word in arguments.drives[:_NAMED])
+        title = f"{names}{', ...' if len(arguments.drives) > _NAMED else ''}"
+        title += f", {f'mean of {count} drives' if count > 1 else '1 drive'}"
         write_atomically(picture, png(draw_comparison(title, shown)))
+        files.insert(1, PICTURE)
+    return files
 
 
 def _versions(methods: Sequence[Method]) -> dict[str, str]:
@@ -187,7 +224,7 @@ def _versions(methods: Sequence[Method]) -> dict[str, str]:
 
 
 def _contenders(result: ContestResult, methods: Sequence[Method], every: int) -> list[Contender]:
-    """What the picture shows; the bound at the steps at which it is solved."""
+    """What the picture shows, of drives of one length; the bound at the steps at which it is solved."""
     shown = []
     for method in methods:
         runs = [one for bout, one in result.outcomes if bout.method.name == method.name and len(one.error_m)]
@@ -200,13 +237,7 @@ def _contenders(result: ContestResult, methods: Sequence[Method], every: int) ->
     return shown
 
 
-def _say(
-    arguments: argparse.Namespace,
-    result: ContestResult,
-    lines: Sequence[dict[str, Any]],
-    options: RunOptions,
-) -> int:
-    """Print the table and what failed; the exit status."""
+def _print_table(arguments: argparse.Namespace, lines: Sequence[dict[str, Any]], options: RunOptions) -> None:
     every = arguments.map_every
     rows = [["algorithm", "mean cm", "max cm", "last 50 s", f"every {every}th", "/ map", "NEES", "map cm"]]
     rows[0] += ["mapped", "of", "wrong", "us/step", ""]
@@ -218,10 +249,6 @@ def _say(
     told = [line["method"] for line in lines if line["method"] in TOLD]
     if options.association != "known" and told:
         print(f"association {options.association}: {' and '.join(told)}: given the identities")
-    picture = f"{PICTURE}, " if (arguments.out / PICTURE).is_file() else ""
-    print(f"files in {arguments.out}: compare.json, {picture}summary.json, NAME.estimate.tum, NAME.map.csv")
-    _say_failures(result)
-    return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
 
 
 def _say_failures(result: ContestResult) -> None:

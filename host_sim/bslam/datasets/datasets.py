@@ -37,7 +37,7 @@ def line_to_type(command: str, word: str) -> str:
 
     DIR is that folder or the nearest one of the place; "" if it is no log.
     """
-    folder = Path(word) if Path(word).exists() else _near(word)
+    folder = Path(word) if Path(word).exists() else near_folder(word)
     if folder is None:
         return ""
     if is_bag(folder):
@@ -58,7 +58,7 @@ def _kind_in(folder: Path) -> str | None:
     return next((kind for kind, sign in SIGNS.items() if any(folder.glob(sign))), None)
 
 
-def _near(word: str) -> Path | None:
+def near_folder(word: str) -> Path | None:
     """The folder with a log or bag, at the place of the path `word`, whose name is most like it."""
     place = Path(word).parent
     folders = [one for one in place.iterdir() if one.is_dir()] if place.is_dir() else []
@@ -77,7 +77,7 @@ def find_directory(name: str, collection: str) -> Path:
     for place in [root / name, root / collection / name] if root else []:
         if place.is_dir():
             return place
-    near = _near(name)
+    near = near_folder(name)
     if collection == _OWN_LOGS and (root is None or near or Path(name).name != name):
         said = f"; did you mean {str(near)!r}?" if near else ""
         allowed = "the path of a folder with odometry.csv, sightings.csv, robot.toml"

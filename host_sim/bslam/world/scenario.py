@@ -383,6 +383,9 @@ def scenario_names() -> list[str]:
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
     """A scenario by its name or from a path that ends in .toml; BslamError if it is missing or wrong."""
+    if Path(name_or_path).is_dir():
+        logs = "a log is for bslam replay csv, compare or check"
+        raise BslamError(f"scenario '{name_or_path}': is a folder; allowed: a name, or a .toml; {logs}")
     path = find_toml("scenario", name_or_path, SCENARIOS)
     return _parse_scenario(load_toml(path), path)
 

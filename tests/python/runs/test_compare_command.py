@@ -111,6 +111,28 @@ def test_picture_is_of_what_has_an_error_and_named_only_where_it_is(scene, made,
     assert not [one for one in recwarn if issubclass(one.category, RuntimeWarning)]
 
 
+def test_several_logs_are_a_drive_each(scene, made, capsys):
+    made.circle_log(60, seed=2).write(scene / "other")
+    assert main(["compare", "drive", "other", "--out", "out", "--only", "bslam", "--jobs", "1"]) == 0
+    assert lines_of(scene / "out")["bslam"]["runs"] == 2
+    said = capsys.readouterr().out
+    assert "compare.png" not in said and not (scene / "out" / "compare.png").exists()  # of two lengths
+    assert {path.name for path in (scene / "out").glob("*.tum")} >= {"drive_seed0.bslam.estimate.tum"}
+    (scene / "pairs_0").symlink_to("drive")  # is no reason to doubt the scenario's name
+    assert main(["compare", "pairs", "--only", "orb"]) == 2
+    assert "--only orb" in capsys.readouterr().err
+    for words, said in {
+        ("csv", "drive"): "csv: is no log folder; allowed: paths of log folders, or one SCENARIO",
+        ("drvie",): "drvie: is no log folder; allowed: paths of log folders, or one SCENARIO; did you mean "
+        "'drive'?",
+        ("drive", "./drive"): "another log has its name; allowed: folders of different names",
+    }.items():
+        assert main(["compare", *words]) == 2
+        assert capsys.readouterr().err.strip().endswith(said)
+    assert main(["sweep", "drive"]) == 2
+    assert "'drive': is a folder; allowed: a name, or a .toml; a log is for " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
