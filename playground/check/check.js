@@ -13,13 +13,19 @@ const HANGING = "all else: it takes sightings that change";
 const STRAIGHT = "signs and scale of the turn: it hardly turns while beacons are seen";
 const LEFT_TO_HOST = "scales, mount, noise, exchanged identities: `bslam check` tests them";
 
-/** texts: contents by file name. What is wrong with them, and the log with its files put right. */
+/** texts: contents by file name. The log as it is, and what is wrong with it: of the drive, what is so with
+ * the files put right. Throws PageError, with what is wrong with the files, for what the host refuses. */
 async function checkLog(name, texts) {
     const mended = { ...texts };
     const inFiles = checkFiles(mended);
-    const log = readLog(name, mended);
-    const { findings, untested } = await checkDrive(log);
-    return { log, findings: [...inFiles, ...findings], untested };
+    try {
+        const log = readLog(name, texts);
+        const { findings, untested } = await checkDrive(inFiles.length ? readLog(name, mended) : log);
+        return { log, findings: [...inFiles, ...findings], untested };
+    } catch (error) {
+        const found = inFiles.map(({ what, mend }) => `; check finds: ${what}; mend: ${mend}`);
+        throw error instanceof PageError ? new PageError(error.message + found.join("")) : error;
+    }
 }
 
 async function checkDrive(log) {

@@ -1,6 +1,6 @@
 "use strict";
 // The files as they stand, before the strict reader: stamps, and directions in degrees. What is found is put
-// right in what is read next, so that the rest can be tested: host_sim/bslam/logcheck/files.py.
+// right in a copy, so that the rest can be tested: host_sim/bslam/logcheck/files.py.
 
 const STEMS = ["odometry", "sightings", "truth"];
 const GAP_S = 1;

@@ -176,7 +176,8 @@ function parsed(file, name, rule, texts) {
             return NaN;
         }
         if (Number.isNaN(value) || !rule.holds(value)) {
-            throw fieldError(file, row + 2, name, text, rule.allowed);
+            const why = rule.why && text === "" ? `; ${rule.why}` : "";
+            throw fieldError(file, row + 2, name, text, rule.allowed + why);
         }
         return value;
     });

@@ -45,7 +45,7 @@ const COLUMN_RULES = {
     },
     beacon_id: { allowed: IDENTITY_ALLOWED, isWord: true },
     bearing_rad: {
-        allowed: `radians from -2 pi to 2 pi, which are degrees times pi/180; ${NO_RANGE_ALONE}`,
+        allowed: "radians from -2 pi to 2 pi, which are degrees times pi/180",
         holds: (value) => Math.abs(value) <= 2 * Math.PI,
         why: NO_RANGE_ALONE,
     },

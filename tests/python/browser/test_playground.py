@@ -443,13 +443,37 @@ def test_playground_identities_with_commas_outlast_what_is_put_right(functions, 
     texts["sightings.csv"] = "\n".join([head, *quoted]) + "\n"
     del texts["beacons.csv"]
     found = functions.evaluate(
-        """async texts => {
-            const { log, findings } = await checkLog("log", texts);
+        """texts => {
+            const findings = checkFiles(texts);
+            const log = readLog("log", texts);
             return [findings[0].kind, log.words[0], log.sightings.id.length];
         }""",
         texts,
     )
     assert found == ["degrees", 'shelf 0, "left"', len(rows)]
+
+
+@pytest.mark.parametrize("name", ["nanoseconds", "repeated", "degrees", "clock back"])
+def test_playground_draws_no_log_other_than_it_is(playground, tmp_path, name):
+    file, spoil = SPOILT_FILES[name]
+    folder = folder_of(made_up(seconds=25.0), tmp_path / "drive")
+    (folder / file).write_text(spoil((folder / file).read_text()))
+    found = check_files(folder, tmp_path / "copy")
+    try:
+        trace = run_log(Log.read(folder), RunOptions(sensor="recorded"))
+    except BslamError as refused:
+        before = figures(playground)
+        playground.evaluate(DROP, texts_of(folder))
+        said = str(refused).replace(f"{folder}/", "")
+        said += "".join(f"; check finds: {one.what}; mend: {one.mend}" for one in found)
+        expect(playground.locator("#message")).to_have_text(said)
+        expect(playground.locator("#title")).to_have_text("A robot in a room")
+        assert figures(playground) == before and name in ("degrees", "clock back")
+    else:
+        playground.evaluate(DROP, texts_of(folder))
+        expect(playground.locator("#findings")).to_contain_text(found[0].what)
+        poses = playground.evaluate("page.shown.replay.poses.map(one => [one.x, one.y, one.theta])")
+        assert np.array_equal(np.array(poses), trace.pose) and name in ("nanoseconds", "repeated")
 
 
 def test_playground_a_replay_ends_where_nobody_wants_it(functions, tmp_path):
