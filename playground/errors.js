@@ -38,7 +38,8 @@ function commonLetters(a, b) {
 }
 
 /** A text in quotes, as Python prints it. */
-function quoted(text) {
+function quoted(given) {
+    const text = given.replaceAll("\\", "\\\\").replaceAll("\t", "\\t");
     return text.includes("'") && !text.includes('"') ? `"${text}"` : `'${text.replaceAll("'", "\\'")}'`;
 }
 

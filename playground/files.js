@@ -1,7 +1,9 @@
 "use strict";
 // Files that were dropped or chosen, as texts by their names.
 
-const LOG_FILES = ["odometry.csv", "sightings.csv", "truth.csv", "beacons.csv", "robot.toml"];
+const NEEDED_FILES = ["odometry.csv", "sightings.csv", "robot.toml"];
+const LOG_FILES = [...NEEDED_FILES, "truth.csv", "beacons.csv"];
+const ROBOT_EXAMPLE = "docs/LOG-FORMAT.md, 'Your own robot's log', has one to copy";
 const TEXT_MB_MAX = 256;
 
 /** The files of a drop, or those of its first folder, and what to call them together. Throws PageError. */
@@ -44,7 +46,8 @@ async function filesIn(folder, handles) {
     return Promise.all(found.map(fileOf));
 }
 
-/** Texts of the files of a log by their names without ".gz". Throws PageError if there is none. */
+/** Texts of the files of a log by their names without ".gz". Throws PageError if one that it needs is not
+ * there. */
 async function logTexts(files) {
     const texts = {};
     for (const file of files) {
@@ -57,13 +60,32 @@ async function logTexts(files) {
         }
         texts[name] = await textOf(file);
     }
-    if (Object.keys(texts).length === 0) {
-        const names = files.map((file) => file.name).join(", ") || "nothing";
+    requireFiles(
+        Object.keys(texts),
+        files.map((file) => file.name),
+    );
+    return texts;
+}
+
+/** there: files of the log; given: names of all files. */
+function requireFiles(there, given) {
+    const absent = LOG_FILES.filter((name) => !there.includes(name));
+    const capital = given.find((name) => absent.includes(name.toLowerCase().replace(/\.gz$/, "")));
+    if (capital) {
+        throw new PageError(`${capital}: is no name of a log's file; allowed: ${capital.toLowerCase()}`);
+    }
+    if (there.length === 0) {
+        const names = given.join(", ") || "nothing";
         throw new PageError(
             `${names}: no file of a log; allowed: ${LOG_FILES.join(", ")}, each perhaps as .gz`,
         );
     }
-    return texts;
+    const missing = NEEDED_FILES.find((name) => absent.includes(name));
+    if (missing) {
+        const needs = `a log needs ${NEEDED_FILES.join(", ")}, all at once`;
+        const example = missing === "robot.toml" ? `; ${ROBOT_EXAMPLE}` : "";
+        throw new PageError(`${there.join(", ")}: ${missing} is missing; ${needs}${example}`);
+    }
 }
 
 async function textOf(file, megabytesMax = TEXT_MB_MAX) {

@@ -55,7 +55,7 @@ class RawTable {
 
 /** Findings of the files; `texts` becomes what they are with these put right. */
 function checkFiles(texts) {
-    const stepUs = "robot.toml" in texts ? parseToml("robot.toml", texts["robot.toml"]).step_us : NaN;
+    const stepUs = parseToml("robot.toml", texts["robot.toml"]).step_us;
     const findings = [];
     let span = null; // of odometry
     for (const file of STEMS.map((stem) => `${stem}.csv`)) {

@@ -154,16 +154,34 @@ function matchLayout(file, names, layouts, optional, rules) {
     }
     const wanted = layouts.map((layout) => layout.join()).join(" or ");
     const extra = optional.length ? ` (and perhaps ${optional.join()})` : "";
+    if (!names.some(Boolean)) {
+        const where = names.length ? `${file}, line 1` : file;
+        throw new PageError(`${where}: is empty; allowed: columns ${wanted}${extra}`);
+    }
     const missing = layouts[0].filter((name) => rules[name].why && !names.includes(name));
     const why = missing.map((name) => `; ${rules[name].why}`).join("");
     const known = [...new Set([...layouts.flat(), ...optional])];
-    const unknown = names.find((name) => !known.includes(name)) || "";
-    const near = didYouMean(
-        unknown,
-        known.filter((name) => !names.includes(name)),
-    );
     const said = `columns ${quoted(names.join())} are not allowed`;
-    throw new PageError(`${file}, line 1: ${said}; allowed: ${wanted}${extra}${why}${near}`);
+    const which = offender(names, known);
+    throw new PageError(`${file}, line 1: ${said}; allowed: ${wanted}${extra}${why}${which}`);
+}
+
+/** Which of the names is wrong, as far as one alone is, and how to mend it. */
+function offender(names, known) {
+    const separator = names.length === 1 && [...";\t |"].find((one) => names[0].includes(one));
+    if (separator) {
+        return `; commas separate columns, not ${quoted(separator)}, and 0.5 is written with a point`;
+    }
+    if (names.includes("")) {
+        return `; column ${names.indexOf("") + 1} has no name: of pandas? to_csv(..., index=False)`;
+    }
+    const unknown = names.filter((name) => !known.includes(name));
+    if (unknown.length) {
+        const free = known.filter((name) => !names.includes(name));
+        return `; not one of them: ${unknown.map(quoted).join(", ")}${didYouMean(unknown[0], free)}`;
+    }
+    const twice = names.find((name, place) => names.indexOf(name) !== place);
+    return twice ? `; ${quoted(twice)} is there twice` : "";
 }
 
 function parsed(file, name, rule, texts) {

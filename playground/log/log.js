@@ -74,16 +74,9 @@ const COLUMN_RULES = {
     theta_rad: { ...NUMBER, allowed: "a number from -1e6 to 1e6, or empty", mayBeEmpty: true },
 };
 
-/** texts: the files' contents by their names without ".gz". Throws PageError. */
+/** texts: the files' contents by their names without ".gz", those that a log needs among them. Throws
+ * PageError. */
 function readLog(name, texts) {
-    for (const file of ["odometry.csv", "sightings.csv", "robot.toml"]) {
-        if (!(file in texts)) {
-            const there = Object.keys(texts).join(", ");
-            throw new PageError(
-                `${there}: ${file} is missing; a log needs odometry.csv, sightings.csv, robot.toml`,
-            );
-        }
-    }
     const notes = [];
     const robot = readRobot("robot.toml", texts["robot.toml"]);
     const odometry = readOdometry(texts["odometry.csv"], robot, notes);

@@ -367,7 +367,29 @@ def instead(name, change):
 
 BAD_DROPS = {
     "another file": (lambda _: {"holiday.csv": "a,b\n1,2\n"}, "holiday.csv: no file of a log"),
-    "no robot.toml": (without("robot.toml"), "robot.toml is missing"),
+    "no robot.toml": (
+        without("robot.toml"),
+        "robot.toml is missing; a log needs odometry.csv, sightings.csv, robot.toml, all at once; "
+        "docs/LOG-FORMAT.md, 'Your own robot's log', has one to copy",
+    ),
+    "a name in capitals": (
+        lambda texts: {key.replace("odometry.csv", "Odometry.CSV"): text for key, text in texts.items()},
+        "Odometry.CSV: is no name of a log's file; allowed: odometry.csv",
+    ),
+    "an empty file": (instead("odometry.csv", lambda _: ""), "odometry.csv: is empty; allowed: columns time"),
+    "semicolons": (
+        instead("odometry.csv", lambda text: text.replace(",", ";").replace(".", ",")),
+        "; commas separate columns, not ';', and 0.5 is written with a point",
+    ),
+    "tabs": (instead("odometry.csv", lambda text: text.replace(",", "\t")), r"columns, not '\t', and 0.5"),
+    "a column without a name": (
+        instead("odometry.csv", lambda text: text.replace("time_us", ",time_us", 1)),
+        "; column 1 has no name: of pandas? to_csv(..., index=False)",
+    ),
+    "a column twice": (
+        instead("odometry.csv", lambda text: text.replace("right_m", "left_m", 1)),
+        "; 'left_m' is there twice",
+    ),
     "no sightings": (without("sightings.csv"), "sightings.csv is missing"),
     "no rows": (instead("odometry.csv", lambda text: text.splitlines()[0]), "odometry.csv: no rows below"),
     "columns": (
@@ -492,7 +514,20 @@ def test_playground_a_replay_ends_where_nobody_wants_it(functions, tmp_path):
 def test_playground_says_what_the_strict_reader_says(playground, tmp_path):
     good = folder_of(made_up(seconds=10.0), tmp_path / "drive")
     texts = texts_of(good)
-    for name in ("no rows", "columns", "a word", "a short row", "a key", "beyond its range"):
+    for name in (
+        "no rows",
+        "columns",
+        "a word",
+        "a short row",
+        "a key",
+        "beyond its range",
+        "a name in capitals",
+        "an empty file",
+        "semicolons",
+        "tabs",
+        "a column without a name",
+        "a column twice",
+    ):
         changed = BAD_DROPS[name][0](texts)
         for path in good.iterdir():
             path.unlink()
