@@ -31,14 +31,8 @@ const page = {
 };
 
 function readChoices() {
-    const numbers = NUMBERS.map((id) => [id, clamped(element(id))]);
+    const numbers = NUMBERS.map((id) => [id, Number(element(id).value)]);
     return Object.fromEntries([...WORDS.map((id) => [id, element(id).value]), ...numbers]);
-}
-
-/** The number in a field, or the nearest that it allows. */
-function clamped(field) {
-    const value = Number(field.value) || 0;
-    return field.max ? Math.min(Math.max(value, Number(field.min)), Number(field.max)) : value;
 }
 
 function say(text) {
@@ -47,6 +41,11 @@ function say(text) {
 }
 
 function restart() {
+    const bad = NUMBERS.map(element).find((field) => !field.checkValidity());
+    if (bad) {
+        say(`${bad.id} ${quoted(bad.value)} is not allowed; allowed: an integer from ${bad.min} to ${bad.max}`);
+        return;
+    }
     page.drive = new Drive(readChoices());
     page.owedSteps = 0;
     for (let step = 0; step < FIRST_STEPS; step++) {
@@ -231,6 +230,10 @@ function bind() {
     window.addEventListener("resize", show);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
     bindPads();
+    for (const id of ["pads", "run"]) {
+        // A click takes no focus, or the space bar would press that button again in place of a pause.
+        element(id).addEventListener("mousedown", (event) => event.preventDefault());
+    }
     element("pause").addEventListener("click", () => setPlaying(!page.isPlaying));
     element("step").addEventListener("click", () => {
         setPlaying(false);

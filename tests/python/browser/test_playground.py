@@ -224,6 +224,35 @@ def test_playground_pauses_steps_and_starts_anew(playground):
     assert playground.evaluate("page.drive.beacons.every(one => one.label === -1)")
 
 
+def test_playground_the_space_bar_pauses_after_a_click_too(playground):
+    slips = "page.drive.world.slipUntilUs"
+    for click in ("Slip", "Go on", "turn left"):
+        playground.get_by_role("button", name=click).click()
+        playground.evaluate(f"setPlaying(true); {slips} = 0")
+        playground.keyboard.press("Space")
+        assert playground.evaluate(f"[page.isPlaying, {slips}]") == [False, 0]
+    playground.locator("#self").click()
+    playground.keyboard.press("Space")
+    assert playground.evaluate("[page.isPlaying, element('self').checked]") == [True, True]
+    playground.evaluate("setPlaying(false)")
+    playground.get_by_role("button", name="Slip").press("Space")  # come to by the tab key
+    assert playground.evaluate(f"[page.isPlaying, {slips} > 0]") == [False, True]
+
+
+@pytest.mark.parametrize("seed", ["-5", "", "1.5", "1000000"])
+def test_playground_takes_no_other_seed_than_it_shows(playground, seed):
+    drive = playground.evaluate_handle("page.drive")
+    for again in (lambda: None, playground.get_by_role("button", name="Restart").click):
+        playground.locator("#seed").fill(seed)
+        again()
+        said = f"seed '{seed}' is not allowed; allowed: an integer from 0 to 999999"
+        expect(playground.locator("#message")).to_have_text(said)
+        assert playground.evaluate("drive => page.drive === drive", drive)
+    playground.locator("#seed").fill("4")
+    expect(playground.locator("#message")).to_be_hidden()
+    assert playground.evaluate("page.drive.choices.seed") == 4
+
+
 def test_playground_a_kidnapped_robot_finds_itself(playground):
     playground.evaluate("takeSteps(700); page.drive.world.kidnap(); takeSteps(5)")
     assert playground.evaluate("lastOf(page.drive.errors, 1)") > 1.0
