@@ -54,6 +54,11 @@ function squaredOver([e0, e1, e2], [xx, yx, yy, tx, ty, tt]) {
     return l00 > 0 && l11 > 0 && l22 > 0 && Number.isFinite(squared) ? squared : NEES_SINGULAR;
 }
 
+/** A pose without its heading. */
+function gaussianOf({ x, y, lower: [xx, xy, yy] }) {
+    return { x, y, xx, xy, yy };
+}
+
 /** Half axes and turn of the ellipse that holds 95 %. */
 function ellipse95({ xx, xy, yy }) {
     const scale = 5.991; // chi-square, 2 degrees of freedom

@@ -73,9 +73,20 @@ class MapView {
             this.drawRobot(scene.truePose, this.colours.truth);
         }
         if (scene.pose) {
-            const [xx, xy, yy] = scene.pose.lower;
-            this.drawEllipse({ ...scene.pose, xx, xy, yy }, this.colours.estimate);
+            this.drawEllipse(gaussianOf(scene.pose), this.colours.estimate);
             this.drawRobot(scene.pose, this.colours.estimate);
+        }
+        this.writeNames(scene);
+    }
+
+    /** On top of all else. */
+    writeNames({ trueBeacons, beacons }) {
+        for (const { name, x, y } of trueBeacons) {
+            this.write(name, this.x(x) + 9, this.y(y) + 4, this.colours.truth);
+        }
+        for (const { name, x, y, confirmed } of beacons) {
+            const colour = confirmed ? this.colours.estimate : this.colours.ink;
+            this.write(name, this.x(x) - 8, this.y(y) - 8, colour, "right");
         }
     }
 
@@ -122,7 +133,7 @@ class MapView {
         });
     }
 
-    drawTrueBeacon({ name, x, y }) {
+    drawTrueBeacon({ x, y }) {
         const [px, py] = [this.x(x), this.y(y)];
         this.stroke(this.colours.truth, 2, [], () => {
             this.pen.moveTo(px, py - 6);
@@ -131,7 +142,6 @@ class MapView {
             this.pen.lineTo(px - 6, py);
             this.pen.closePath();
         });
-        this.write(name, px + 9, py + 4, this.colours.truth);
     }
 
     drawBeacon(beacon) {
@@ -144,7 +154,6 @@ class MapView {
             this.pen.moveTo(px, py - 3);
             this.pen.lineTo(px, py + 3);
         });
-        this.write(beacon.name, px - 8, py - 8, beacon.confirmed ? colour : this.colours.ink, "right");
     }
 
     /** With a rim of paper, so that it can be read on a line. */

@@ -96,9 +96,15 @@ function backToRoom() {
 }
 
 function setMode(isLog) {
-    document.querySelectorAll(".room").forEach((one) => (one.hidden = isLog));
-    document.querySelectorAll(".log").forEach((one) => (one.hidden = !isLog));
+    hide(".room", isLog);
+    hide(".log", !isLog);
     element("title").textContent = isLog ? logTitle(page.shown.checked) : "A robot in a room";
+    hide(".truePath", isLog && page.shown.checked.log.truth === null);
+    hide(".trueBeacons", isLog && page.shown.checked.log.beacons === null);
+}
+
+function hide(selector, isHidden) {
+    document.querySelectorAll(selector).forEach((one) => (one.hidden = isHidden));
 }
 
 /** The verdict first. */
@@ -117,14 +123,15 @@ function showLog({ checked, replay, result }) {
         ...one,
         name: identityText(checked.log, one.id),
     }));
+    const pose = poses[poses.length - 1];
     new MapView(element("map"), {
-        bounds: boundsOf([...path, ...truePath, ...trueBeacons, ...result.beacons]),
+        bounds: boundsOfLog(replay, result),
         path,
         truePath,
         odometryPath,
         trueBeacons,
         beacons: result.beacons.map((one) => ({ ...one, name: logName(checked.log, trueBeacons, one) })),
-        pose: poses[poses.length - 1],
+        pose,
         truePose: Number.isFinite(lastTruth.theta) ? lastTruth : null,
     });
     drawPlots(element("plots"), thinned(result.errors));
@@ -148,6 +155,27 @@ function logName(log, trueBeacons, beacon) {
         return `#${beacon.uid}`;
     }
     return trueBeacons.some((one) => one.id === beacon.label) ? "" : identityText(log, beacon.label);
+}
+
+/** Of the paths and of what was seen from them. */
+function boundsOfLog({ poses }, { truth, trueBeacons, beacons }) {
+    const places = [...poses, ...truth, ...trueBeacons];
+    const known = boundsOf(places);
+    const widest = Math.max(known.right - known.left, known.top - known.bottom);
+    const ellipses = [...beacons, gaussianOf(poses[poses.length - 1])];
+    return boundsOf([...places, ...ellipses.flatMap((one) => cornersOf(one, widest))]);
+}
+
+/** Of an ellipse; none of one so wide that in its picture the path would be a point. */
+function cornersOf(gaussian, widest) {
+    const { x, y } = gaussian;
+    const { major } = ellipse95(gaussian);
+    return major < widest
+        ? [
+              { x: x - major, y: y - major },
+              { x: x + major, y: y + major },
+          ]
+        : [];
 }
 
 function boundsOf(places) {

@@ -96,6 +96,78 @@ def test_playground_fits_its_window(playground, width):
     assert playground.locator("#map").bounding_box()["width"] > 0.6 * width
 
 
+def test_playground_all_of_the_stage_is_on_a_screen(playground, tmp_path):
+    playground.set_viewport_size({"width": 1920, "height": 960})
+    assert playground.evaluate("document.documentElement.scrollHeight") <= 960
+    room = playground.locator("#map").bounding_box()
+    assert room["height"] > 400
+    for has_truth in (True, False):
+        log = made_up(seconds=10.0, has_truth=has_truth)
+        playground.evaluate(DROP, texts_of(folder_of(log, tmp_path / str(has_truth))))
+        expect(playground.locator("#legend .truePath")).to_be_visible(visible=has_truth)
+        expect(playground.locator("#legend .trueBeacons")).to_be_visible(visible=not has_truth)
+        expect(playground.locator("#plots")).to_be_visible(visible=has_truth)
+        assert playground.evaluate("document.documentElement.scrollHeight") <= 960
+    assert playground.locator("#map").bounding_box()["height"] > 1.4 * room["height"]
+    playground.get_by_role("button", name="Back to the room").click()
+    expect(playground.locator("#legend .trueBeacons")).to_be_visible()
+    assert playground.locator("#map").bounding_box() == room
+
+
+def test_playground_on_a_phone_shows_what_became_of_the_files(playground, tmp_path):
+    playground.set_viewport_size({"width": 390, "height": 740})
+    (picture := tmp_path / "holiday.png").write_bytes(b"\x89PNG")
+    files = playground.locator("#files")
+    files.set_input_files(picture)
+    expect(playground.locator("#message")).to_contain_text("holiday.png: no file of a log")
+    assert playground.evaluate("scrollY") == 0  # where the button is
+    expect(playground.locator("#message")).to_be_in_viewport(ratio=1)
+    playground.evaluate("scrollTo(0, 600)")
+    expect(playground.locator("#message")).to_be_in_viewport(ratio=1)
+    playground.evaluate("scrollTo(0, 0)")
+    files.set_input_files(sorted(folder_of(made_up(seconds=10.0), tmp_path / "drive").iterdir()))
+    expect(playground.locator("#title")).to_have_text("log: 0 findings")
+    expect(playground.locator("#map")).to_be_in_viewport(ratio=1)
+
+
+def test_playground_a_path_is_seen_and_so_is_what_it_sees(playground, tmp_path):
+    """Also where all is in millimetres, and beacons may be anywhere."""
+    good = made_up(seconds=20.0)
+    in_all = with_odometry(in_mm(good), a=1e3 * good.odometry.a, b=1e3 * good.odometry.b)
+    for number, log in enumerate((good, in_all)):
+        playground.evaluate(DROP, texts_of(folder_of(log, tmp_path / str(number))))
+        expect(playground.locator("#title")).to_have_text(f"log: {number} finding{'s' * (1 - number)}")
+        seen, path, missing = playground.evaluate(
+            """() => {
+                const { replay, result } = page.shown;
+                const [path, scene] = [boundsOf(replay.poses), boundsOfLog(replay, result)];
+                const isOut = ({ x, y }) =>
+                    x < scene.left || x > scene.right || y < scene.bottom || y > scene.top;
+                const missing = result.beacons.filter(isOut).length;
+                return [scene.right - scene.left, path.right - path.left, missing];
+            }"""
+        )
+        assert path > 0.2 * seen and (missing == 0 or log is in_all)
+
+
+def test_playground_names_are_on_top(playground):
+    last = playground.evaluate(
+        """() => {
+            const drawn = [];
+            for (const name of ["stroke", "ellipse", "fillText"]) {
+                const real = CanvasRenderingContext2D.prototype[name];
+                CanvasRenderingContext2D.prototype[name] = function (...given) {
+                    if (this.canvas.id === "map") drawn.push(name);
+                    return real.apply(this, given);
+                };
+            }
+            show();
+            return [drawn.indexOf("fillText"), drawn.lastIndexOf("ellipse"), drawn.lastIndexOf("stroke")];
+        }"""
+    )
+    assert last[0] > max(last[1:]) > 0
+
+
 def test_playground_legend_has_the_colours_of_the_lines(playground):
     pairs = playground.evaluate(
         """() => ["truth", "estimate", "odometry", "right", "wrong", "new", "rejected"].map(name => {
