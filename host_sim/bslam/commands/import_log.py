@@ -32,6 +32,10 @@ one of its kind. Where the camera sits comes from /tf_static. Stamps are those o
 --tags: {HELP}
 Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
 
+_MOUNT_HELP = (
+    "the camera, m and rad, in place of /tf_static; level if no pitch is given (positive: it looks down)"
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
@@ -54,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--image", choices=["raw", "rectified"], help="what the corners of AprilTags are of")
     parser.add_argument("--pixel-sd", type=float, default=0.5, metavar="PX", help="noise of corners (0.5)")
     parser.add_argument("--base", metavar="FRAME", help="the robot's frame; default: the odometry's child")
-    parser.add_argument("--mount", metavar="X,Y,YAW", help="the camera, m and rad, in place of /tf_static")
+    parser.add_argument("--mount", metavar="X,Y,YAW[,PITCH[,ROLL]]", help=_MOUNT_HELP)
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="a key of robot.toml; may be repeated"
     )
@@ -108,16 +112,17 @@ def _sizes(arguments: argparse.Namespace) -> TagSizes | None:
     return TagSizes(table.side_m, SIDE_M.convert(arguments.tag_size, "--tag-size"))
 
 
-def _mount(text: str) -> tuple[float, float, float]:
-    limits = (number(-100.0, 100.0), number(-100.0, 100.0), number(-3.2, 3.2))
+def _mount(text: str) -> tuple[float, ...]:
+    limits = (*[number(-100.0, 100.0)] * 2, *[number(-3.2, 3.2)] * 3)
     try:
         values = [float(word) for word in text.split(",")]
-        x_m, y_m, yaw_rad = (
-            rule.convert(one, f"--mount {text}") for rule, one in zip(limits, values, strict=True)
-        )
     except ValueError:
-        raise BslamError(f"--mount {text!r}: allowed: X_M,Y_M,YAW_RAD, as 0.1,0,0") from None
-    return x_m, y_m, yaw_rad
+        values = []
+    if not 3 <= len(values) <= len(limits):
+        raise BslamError(
+            f"--mount {text!r}: allowed: X_M,Y_M,YAW_RAD, as 0.1,0,0, and ,PITCH_RAD,ROLL_RAD if not level"
+        )
+    return tuple(rule.convert(one, f"--mount {text}") for rule, one in zip(limits, values, strict=False))
 
 
 def _robot_keys(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -42,10 +42,18 @@ class Transform:
         return Transform(_rotation(quaternion), np.asarray(place_m, dtype=np.float64))
 
     @staticmethod
-    def of_camera(x_m: float, y_m: float, yaw_rad: float) -> Transform:
-        """An optical frame on a robot that looks along the level."""
-        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-        return Transform(np.array([[s, 0.0, c], [-c, 0.0, s], [0.0, -1.0, 0.0]]), np.array([x_m, y_m, 0.0]))
+    def of_camera(
+        x_m: float, y_m: float, yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float = 0.0
+    ) -> Transform:
+        """An optical frame on a robot; angles as REP-103 has them: pitch is positive where it looks down."""
+        (cr, sr), (cp, sp), (cy, sy) = (
+            (math.cos(one), math.sin(one)) for one in (roll_rad, pitch_rad, yaw_rad)
+        )
+        ahead = [cy * cp, sy * cp, -sp]
+        left = [cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr]
+        up = [cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr]
+        rotation = np.column_stack([-np.array(left), -np.array(up), ahead])
+        return Transform(rotation, np.array([x_m, y_m, 0.0]))
 
     def after(self, other: Transform) -> Transform:
         """`other` is in this frame: its pose in this frame's parent."""
@@ -105,11 +113,20 @@ class Mount:
     @staticmethod
     def of(pose: Transform) -> Mount:
         """Of a camera's pose in the robot's frame: it looks along z, or along x if z points up or down."""
-        axes = (pose.rotation[:2, 2], pose.rotation[:2, 0])
-        axis = next((one for one in axes if float(np.hypot(*one)) > _UPRIGHT), axes[1])
+        axis = _looking_along(pose)
         return Mount(
             float(pose.place_m[0]), float(pose.place_m[1]), math.atan2(float(axis[1]), float(axis[0]))
         )
+
+
+def looks_down_rad(pose: Transform) -> float:
+    """By how much a camera looks below the level."""
+    return -math.asin(min(1.0, max(-1.0, float(_looking_along(pose)[2]))))
+
+
+def _looking_along(pose: Transform) -> Floats:
+    axes = (pose.rotation[:, 2], pose.rotation[:, 0])
+    return next((one for one in axes if float(np.hypot(*one[:2])) > _UPRIGHT), axes[1])
 
 
 def on_ground(

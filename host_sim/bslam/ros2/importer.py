@@ -16,7 +16,7 @@ from bslam.errors import BslamError
 from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
 from bslam.ros2.bag import Bag, name_of
-from bslam.ros2.geometry import Camera, Transform, base_on, pose_in
+from bslam.ros2.geometry import Camera, Mount, Transform, base_on, looks_down_rad, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
     CORNERS,
@@ -57,6 +57,7 @@ _NOISE_OF_SIGHTINGS: Final = (
     "range_sigma_scale_m",
     "range_sigma_floor_m",
 )
+_MOUNT_LEVEL: Final = 3  # numbers of a --mount without a pitch
 _ROOM_AT_THE_EDGES: Final = 1.05  # of a field of view that is only known by what was seen
 
 
@@ -77,7 +78,7 @@ class Request:
     sizes: TagSizes | None = None
     pixel_sd: float = 0.5
     base: str | None = None  # the robot's frame; None: the child frame of the odometry
-    mount: tuple[float, float, float] | None = None  # x, y, yaw of the camera; None: from /tf_static
+    mount: tuple[float, ...] | None = None  # x, y, yaw, pitch, roll of the camera, or fewer; None: /tf_static
     robot: Mapping[str, Any] = field(default_factory=dict)  # keys of robot.toml
 
 
@@ -137,7 +138,7 @@ def import_bag(path: Path, request: Request) -> Imported:
         kinds = dict(bag.topics)
     travel = _travel(read, chosen, request, path, notes).after_pause(chosen.motion, notes)
     gyro_radps, gyro_said = _gyro(read, chosen, request, travel, path, notes)
-    markers = _markers(read, chosen, request, path)
+    markers = _markers(read, chosen, request, path, notes)
     sightings, words = sightings_of(read.frames, markers, chosen.detections[0], notes)
     sightings = _within(sightings, travel, chosen, notes)
     robot, guessed = _robot(request, travel, sightings, markers, gyro_said)
@@ -340,7 +341,7 @@ def _base(read: _Read, request: Request) -> str:
 # --- markers ------------------------------------------------------------------------------------------------
 
 
-def _markers(read: _Read, chosen: _Chosen, request: Request, path: Path) -> Markers:
+def _markers(read: _Read, chosen: _Chosen, request: Request, path: Path, notes: list[str]) -> Markers:
     topic, kind = chosen.detections
     detections = [one for frame in read.frames for one in frame.detections]
     if not detections:
@@ -353,14 +354,19 @@ def _markers(read: _Read, chosen: _Chosen, request: Request, path: Path) -> Mark
     elif request.sizes is not None:
         raise BslamError(f"{topic}: {kind} tells places, so sizes of tags have no use; allowed: no --tags")
     frames = sorted({frame.frame_id for frame in read.frames if frame.detections})
-    poses = {frame: _camera_pose(read, request, frame, path) for frame in frames}
+    poses = {frame: _camera_pose(read, request, frame, path, notes) for frame in frames}
     return Markers(poses, sizes, _camera(read, request, frames, kind in CORNERS), request.pixel_sd)
 
 
-def _camera_pose(read: _Read, request: Request, frame: str, path: Path) -> Transform:
-    if request.mount is not None:
-        return Transform.of_camera(*request.mount)
+def _camera_pose(read: _Read, request: Request, frame: str, path: Path, notes: list[str]) -> Transform:
     base = _base(read, request)
+    if request.mount is not None:
+        known = pose_in(read.tree, base, frame)
+        instead = "" if known is None else f"in place of {_at(known)}, as {TF_STATIC} has it"
+        level = "" if len(request.mount) > _MOUNT_LEVEL else "the camera is assumed level"
+        if instead or level:
+            notes.append(f"--mount: {'; '.join(filter(None, (level, instead)))}")
+        return Transform.of_camera(*request.mount)
     pose = _pose_in(read, base, frame, path)
     if pose is None:
         raise BslamError(
@@ -481,12 +487,18 @@ def _told(read: _Read, chosen: _Chosen, kinds: Mapping[str, str], log: Log, mark
     lines.append(
         f"sightings: {len(log.sightings.time_us)} of {len(numbers)} beacons: {named or 'no identity'}"
     )
-    mount = markers.mount
-    at = f"x {mount.x_m:.3f} m, y {mount.y_m:.3f} m, yaw {mount.yaw_rad:.4f} rad"
-    lines.append(f"sensor: {', '.join(markers.poses)} at {at}")
+    lines += [f"sensor: {name} at {_at(pose)}" for name, pose in markers.poses.items()]
+    if len(markers.poses) > 1:
+        lines.append("sensors: the log tells what they see as from the robot's middle")
     if log.truth is not None:
         lines.append(f"truth: {len(log.truth.time_us)} poses")
     return lines
+
+
+def _at(pose: Transform) -> str:
+    mount = Mount.of(pose)
+    at = f"x {mount.x_m:.3f} m, y {mount.y_m:.3f} m, yaw {mount.yaw_rad:.4f} rad"
+    return f"{at}, looking {looks_down_rad(pose):.4f} rad down"
 
 
 def _rate(count: int, span_ns: tuple[int, int] | None) -> str:

@@ -196,6 +196,21 @@ def test_a_folder_that_is_there_keeps_what_is_no_log(
     Log.read(tmp_path)
 
 
+def test_a_mount_without_a_pitch_says_that_it_takes_the_camera_for_level(
+    tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs = []
+    for mount in ("0.12,0.05,0.3", "0.12,0.05,0.3,0.2"):
+        assert main(["import", "ros2", str(aruco), "--mount", mount, "--out", str(tmp_path / mount)]) == 0
+        logs.append(Log.read(tmp_path / mount))
+    level, tilted = capsys.readouterr().out.split("log in ", 1)
+    assert "note: --mount: the camera is assumed level; in place of x 0.120 m, y 0.050 m, yaw" in level
+    assert "looking 0.2000 rad down, as /tf_static has it" in tilted and "assumed level" not in tilted
+    direct = imported(aruco)
+    np.testing.assert_allclose(logs[1].sightings.range_m, direct.sightings.range_m, atol=1e-9)
+    assert np.abs(logs[0].sightings.range_m / direct.sightings.range_m - 1.0).max() > 0.01
+
+
 # --- bad input ----------------------------------------------------------------------------------------------
 
 BAD = {

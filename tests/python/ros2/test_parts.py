@@ -17,6 +17,7 @@ from bslam.ros2.geometry import (
     Transform,
     ellipse_95,
     frame_over,
+    looks_down_rad,
     on_ground,
     place_tags,
     pose_in,
@@ -26,7 +27,7 @@ from bslam.ros2.messages import PlanarPose, frames_of, poses_of
 from bslam.ros2.stamps import in_order
 from bslam.ros2.tags import TagSizes, read_tag_sizes
 from bslam.ros2.wheels import Gyro, Poses, gyro_means, travel_of_poses
-from ros2.bags import CAMERA, header, new, point, pose, transform, yawed
+from ros2.bags import CAMERA, CAMERA_POSE, header, new, point, pose, transform, yawed
 
 SQUARE = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
 UP = Transform(np.eye(3), np.zeros(3))
@@ -108,6 +109,17 @@ def test_a_chain_of_frames_goes_up_and_down() -> None:
 def test_a_mount_looks_along_the_optical_axis_or_ahead() -> None:
     assert Mount.of(Transform.of_camera(0.1, -0.2, 0.5)) == Mount(0.1, -0.2, pytest.approx(0.5))
     assert Mount.of(UP) == Mount(0.0, 0.0, 0.0)
+
+
+def test_a_camera_may_be_tilted_and_rolled() -> None:
+    tilted = Transform.of_camera(0.12, 0.05, 0.3, 0.2)
+    np.testing.assert_allclose(tilted.rotation, CAMERA_POSE.rotation, atol=1e-12)
+    assert looks_down_rad(tilted) == pytest.approx(0.2)
+    rolled = Transform.of_camera(0.0, 0.0, 0.3, 0.2, 0.1)  # its left side goes up
+    assert rolled.rotation[2, 0] == pytest.approx(-math.cos(0.2) * math.sin(0.1))
+    np.testing.assert_allclose(rolled.rotation @ rolled.rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(rolled.rotation) == pytest.approx(1.0)
+    assert Mount.of(rolled).yaw_rad == pytest.approx(0.3)
 
 
 def test_range_is_along_the_ground_and_noise_is_split() -> None:
