@@ -147,6 +147,8 @@ def _robot_keys(arguments: argparse.Namespace) -> dict[str, Any]:
 def _require_place(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise BslamError(f"--out {out}: there is a file of that name; allowed: a folder")
+    if (out / "metadata.yaml").exists():
+        raise BslamError(f"--out {out}: a bag is there; allowed: a folder of the log's own")
 
 
 def _write(log: Log, out: Path) -> list[str]:

@@ -247,7 +247,7 @@ def test_bad_requests_are_one_line(
 
 def assert_refused(tmp_path: Path, words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(tmp_path.rglob("*"))
-    assert main(["import", "ros2", *words.split(), "--out", str(tmp_path / "log")]) == 2
+    assert main(["import", "ros2", "--out", str(tmp_path / "log"), *words.split()]) == 2
     told = capsys.readouterr()
     assert told.out == "" and told.err.count("\n") == 1
     assert said in told.err
@@ -488,6 +488,13 @@ def test_without_rosbags_the_line_says_how_to_get_it(
 def test_out_may_not_be_a_file(tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "log").write_text("")
     assert_refused(tmp_path, str(aruco), "there is a file of that name", capsys)
+
+
+def test_a_log_is_not_written_into_a_bag(
+    tmp_path: Path, aruco: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert_refused(tmp_path, f"{aruco} --out {aruco}", "a bag is there; allowed: a folder", capsys)
+    assert not (aruco / "robot.toml").exists()
 
 
 # Of the .msg files in the repositories of the packages, as REP-2011 has a type hashed.
