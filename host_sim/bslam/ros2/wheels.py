@@ -22,6 +22,8 @@ JUMP_MPS, JUMP_M = 10.0, 1.0
 JUMP_SD: Final = (0.5, 0.5)
 """m and rad that the robot's pose may be off then."""
 SIDEWAYS_SHARE = 0.05
+BROKEN_SHARE_MAX: Final = 0.05
+"""So many messages of a topic may hold numbers that are none."""
 _FIRST_STEPS_MAX = 2
 GYRO_SD_RADPS = 0.02
 """Of a gyro that does not say."""
@@ -93,7 +95,8 @@ def travel_of_poses(told: Poses, topic: str, notes: list[str]) -> Travel:
     order, time_us = _unrepeated(order, time_us, topic, notes)
     pose = np.array([(told.poses[i].x_m, told.poses[i].y_m, told.poses[i].theta_rad) for i in order])
     twist = np.array([told.twists[i] for i in order])
-    _require_finite(np.hstack([pose, twist]), topic)
+    usable = _finite(np.hstack([pose, twist]), order, topic, notes)
+    time_us, pose, twist = time_us[usable], pose[usable], twist[usable]
     way_m, aside_m, turn_rad = arcs(pose)
     dt_s = np.diff(time_us) * 1e-6
     by_twist = is_jump(way_m, aside_m, dt_s)
@@ -189,7 +192,8 @@ def travel_of_joints(
     time_us = np.array(told.stamps_ns, dtype=np.int64)[order] // 1000
     order, time_us = _unrepeated(order, time_us, topic, notes)
     angles_rad = np.array(told.angles_rad)[order]
-    _require_finite(angles_rad, topic)
+    usable = _finite(angles_rad, order, topic, notes)
+    time_us, angles_rad = time_us[usable], angles_rad[usable]
     left_m, right_m = radius_m * np.diff(angles_rad, axis=0).T
     return Travel(time_us, 0.5 * (left_m + right_m), (right_m - left_m) / wheelbase_m)
 
@@ -205,10 +209,20 @@ def _unrepeated(
     return order[new], time_us[new]
 
 
-def _require_finite(values: Floats, topic: str) -> None:
-    bad = ~np.isfinite(values).all(axis=1)
-    if bad.any():
-        raise BslamError(f"{topic}: message {int(np.argmax(bad))} has numbers that are not finite")
+def _finite(values: Floats, order: NDArray[np.int64], topic: str, notes: list[str]) -> NDArray[np.bool_]:
+    """Which rows, that are these messages, have finite numbers alone; notes how many are left out.
+
+    Raises BslamError where they are more than a few.
+    """
+    usable: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
+    bad = int((~usable).sum())
+    if bad:
+        said = f"{bad} of {len(usable)} messages, from message {order[np.argmin(usable)]} on, have numbers"
+        if bad > BROKEN_SHARE_MAX * len(usable):
+            most = f"allowed: {100 * BROKEN_SHARE_MAX:g} %, which are left out"
+            raise BslamError(f"{topic}: {said} that are not finite; {most}")
+        notes.append(f"{topic}: left out {said} that are not finite")
+    return usable
 
 
 @dataclass
@@ -237,7 +251,8 @@ def gyro_means(
     order = in_order(told.stamps_ns, topic, notes)
     stamps_us = np.array(told.stamps_ns, dtype=np.int64)[order] // 1000
     rate = np.array(told.rates_radps)[order] @ pose.rotation[2]
-    _require_finite(rate[:, np.newaxis], topic)
+    usable = _finite(rate[:, np.newaxis], order, topic, notes)
+    stamps_us, rate = stamps_us[usable], rate[usable]
     total = np.concatenate([[0.0], np.cumsum(rate)])
     upto = np.searchsorted(stamps_us, time_us, side="right")
     count = np.diff(upto)
