@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import shutil
 import tempfile
@@ -59,6 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pixel-sd", type=float, default=0.5, metavar="PX", help="noise of corners (0.5)")
     parser.add_argument("--base", metavar="FRAME", help="the robot's frame; default: the odometry's child")
     parser.add_argument("--mount", metavar="X,Y,YAW[,PITCH[,ROLL]]", help=_MOUNT_HELP)
+    parser.add_argument("--start", type=float, default=0.0, metavar="S", help="seconds of the bag (0)")
+    parser.add_argument("--end", type=float, default=math.inf, metavar="S", help="default: its end")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="a key of robot.toml; may be repeated"
     )
@@ -100,6 +103,8 @@ def _request(arguments: argparse.Namespace) -> Request:
         base=arguments.base,
         mount=None if arguments.mount is None else _mount(arguments.mount),
         robot=_robot_keys(arguments),
+        start_s=_start_s(arguments),
+        end_s=arguments.end,
     )
 
 
@@ -110,6 +115,13 @@ def _sizes(arguments: argparse.Namespace) -> TagSizes | None:
     if arguments.tag_size is None:
         return table
     return TagSizes(table.side_m, SIDE_M.convert(arguments.tag_size, "--tag-size"))
+
+
+def _start_s(arguments: argparse.Namespace) -> float:
+    start_s = float(arguments.start)
+    if not 0.0 <= start_s < arguments.end:
+        raise BslamError(f"--start {start_s:g}, --end {arguments.end:g}: allowed: 0 <= start < end")
+    return start_s
 
 
 def _mount(text: str) -> tuple[float, ...]:

@@ -46,6 +46,15 @@ class Bag:
         for one in self._reader.connections:
             self.counts[one.topic] += one.msgcount
 
+    @property
+    def start_ns(self) -> int:
+        """When the first message was received."""
+        return int(self._reader.start_time)
+
+    @property
+    def duration_s(self) -> float:
+        return float(self._reader.duration * 1e-9)
+
     def __enter__(self) -> Bag:
         return self
 

@@ -80,6 +80,8 @@ class Request:
     base: str | None = None  # the robot's frame; None: the child frame of the odometry
     mount: tuple[float, ...] | None = None  # x, y, yaw, pitch, roll of the camera, or fewer; None: /tf_static
     robot: Mapping[str, Any] = field(default_factory=dict)  # keys of robot.toml
+    start_s: float = 0.0  # of the bag's time, by receipt: what to take
+    end_s: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -212,7 +214,11 @@ def _read(bag: Bag, chosen: _Chosen, request: Request) -> _Read:
     if TF_STATIC in bag.topics:
         takers.append((TF_STATIC, lambda message: _take_static(read, message)))
     read.counts = {topic: 0 for topic, _ in takers}
+    always = {TF_STATIC, *chosen.cameras}  # recorders hear these once, at the start
     for topic, received_ns, message in bag.messages(sorted(read.counts)):
+        after_s = (received_ns - bag.start_ns) * 1e-9
+        if not (request.start_s <= after_s <= request.end_s or topic in always):
+            continue
         read.counts[topic] += 1
         read.span_ns[topic] = (read.span_ns.get(topic, (received_ns, 0))[0], received_ns)
         for name, take in takers:
@@ -221,7 +227,14 @@ def _read(bag: Bag, chosen: _Chosen, request: Request) -> _Read:
                     take(message)
     for topic, option in ((chosen.motion, "odometry"), (chosen.detections[0], "detections")):
         if read.counts[topic] == 0:
-            raise BslamError(f"{bag.path}: {topic} ({option}) holds no messages; allowed: a topic with some")
+            cut = (
+                f" within --start and --end; the bag is {bag.duration_s:.1f} s long"
+                if bag.counts[topic]
+                else ""
+            )
+            raise BslamError(
+                f"{bag.path}: {topic} ({option}) holds no messages{cut}; allowed: a topic with some"
+            )
     return read
 
 

@@ -30,9 +30,12 @@ def in_order(stamps_ns: list[int], topic: str, notes: list[str]) -> NDArray[np.i
     behind = np.maximum.accumulate(stamps[kept]) - stamps[kept]
     if behind.size and behind.max() > BACK_MAX_NS:
         row = int(np.argmax(behind > BACK_MAX_NS))
+        after_s = (stamps[kept[row - 1]] - stamps[first]) * 1e-9
         raise BslamError(
             f"{topic}: header.stamp of message {first + row} runs back by {behind[row] * 1e-9:.3f} s; "
-            f"allowed: {BACK_MAX_NS * 1e-9:g} s, as a simulation that starts anew makes two drives of one bag"
+            f"allowed: {BACK_MAX_NS * 1e-9:g} s; a simulation that starts anew makes two drives of one "
+            f"bag: --end S takes the first, --start S the second, S: seconds of the bag, here "
+            f"about {after_s:.1f}"
         )
     if (behind > 0).any():
         notes.append(f"{topic}: {int((behind > 0).sum())} messages came out of order and were sorted")

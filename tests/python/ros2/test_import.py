@@ -308,6 +308,21 @@ def test_poses_of_the_truth_that_are_no_numbers_are_left_out(
     assert log.truth is not None and len(log.truth.time_us) == 61 - len(range(3, 61, 20))
 
 
+def test_a_bag_of_two_drives_is_cut(tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]) -> None:
+    again = [(t + 10**10, *rest) for t, *rest in (*start.odometry(), *start.aruco())]
+    said = [*start.static(), *start.odometry(), *start.aruco(), *again]
+    words = f"{write_bag(tmp_path / 'bag', said)} --wheelbase 0.4"
+    assert_refused(tmp_path, words, "--start S the second, S: seconds of the bag, here about 2.4", capsys)
+    assert_refused(
+        tmp_path, f"{words} --start 20", "no messages within --start and --end; the bag is 12", capsys
+    )
+    assert_refused(tmp_path, f"{words} --start 3 --end 2", "allowed: 0 <= start < end", capsys)
+    for cut in ("--start 5", "--end 5"):
+        log = tmp_path / cut
+        assert main(["import", "ros2", *words.split(), *cut.split(), "--out", str(log)]) == 0
+        np.testing.assert_array_equal(Log.read(log).odometry.time_us - EPOCH_US, start.log.odometry.time_us)
+
+
 def test_a_few_poses_of_the_odometry_that_are_no_numbers_are_left_out(
     tmp_path: Path, start: Drive, capsys: pytest.CaptureFixture[str]
 ) -> None:
