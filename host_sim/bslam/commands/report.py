@@ -140,7 +140,9 @@ def _files(result: BatchResult, more: str) -> list[str]:
     """What was written, a run that failed having left nothing."""
     files = ["summary.json"]
     if not all(outcome.failed for outcome in result.outcomes):
-        files += ["NAME.estimate.tum", "NAME.truth.tum", "NAME.map.csv", f"NAME{SUFFIX}", "*.png"]
+        known = any("position_error_m" in outcome.entry for outcome in result.outcomes)
+        truth = ["NAME.truth.tum"] if known else []
+        files += ["NAME.estimate.tum", *truth, "NAME.map.csv", f"NAME{SUFFIX}", "*.png"]
     return files + ([more] if more else [])
 
 
