@@ -144,7 +144,7 @@ def _follow_in_rerun(arguments: argparse.Namespace) -> int:
     finally:
         show.player.stop()
         stream.disconnect()
-    return show.end()
+    return show.end(None if arguments.rerun == "viewer" else arguments.rerun)
 
 
 class _Show:
@@ -176,13 +176,17 @@ class _Show:
         self._outcome = write_files(self._job, self._out, log, trace, more)
         write_summary(self._out, [self._outcome.entry])
 
-    def end(self) -> int:
-        """Say how it ended; the exit status. Raises BslamError if the run failed."""
+    def end(self, followed_in: str | None = None) -> int:
+        """Say how it ended; the exit status. Raises BslamError if the run failed.
+
+        followed_in: a file that has what was seen of it.
+        """
         moment = self.player.moment
         if moment.state == FAILED:
             raise BslamError(moment.message)
         if self._outcome is None:
-            print(f"stopped at step {moment.step} of {self.stage.steps}: nothing was written")
+            left = "nothing was written" if followed_in is None else f"{followed_in} ends there"
+            print(f"stopped at step {moment.step} of {self.stage.steps}: {left}")
             return 1
         return finish(BatchResult((self._outcome,), interrupted=False), self._out)
 

@@ -20,6 +20,8 @@ from bslam.moment import FAILED, FINISHED, Moment, Spot, Stage, Told
 INSTALL: Final = "pip install rerun-sdk"
 FILE_SUFFIX: Final = ".rrd"
 _POLL_S: Final = 0.03
+_FLUSH_S: Final = 30.0  # at most for what a viewer, or a disk, has yet to take
+_INTO_A_FILE: Final = f"allowed: --rerun FILE{FILE_SUFFIX}, for a viewer elsewhere"
 _PATH_EVERY_S: Final = 1.0  # of the log: a path is sent whole
 _SIGMAS: Final = 2.4477  # 95 %
 _ROUND: Final = np.linspace(0.0, math.tau, 25)
@@ -35,10 +37,14 @@ def open_stream(target: str) -> Any:
     """A stream of Rerun's: to a viewer that is started ("viewer"), or into FILE.rrd. Raises BslamError."""
     if target != "viewer" and not target.endswith(FILE_SUFFIX):
         raise BslamError(f"--rerun {target!r}: allowed: --rerun alone (opens a viewer), or FILE{FILE_SUFFIX}")
+    from bslam.view.serve import has_screen  # here: it takes a second
+
     try:
         import rerun
     except ImportError as error:
         raise BslamError(f"--rerun needs the package rerun-sdk, which is missing: {INSTALL}") from error
+    if target == "viewer" and not has_screen():
+        raise BslamError(f"--rerun: no screen for its viewer here; {_INTO_A_FILE}")
     stream = rerun.RecordingStream("bslam")
     try:
         stream.spawn() if target == "viewer" else stream.save(target)
@@ -48,12 +54,16 @@ def open_stream(target: str) -> Any:
 
 
 def follow(scene: Scene, newest: Callable[[], Moment]) -> None:
-    """Show moments until the run has ended."""
+    """Show moments until the run has ended. Raises BslamError if the viewer has gone."""
     while True:
         moment = newest()
         scene.show(moment)
         if moment.state in (FINISHED, FAILED):
-            scene.stream.flush()
+            try:
+                scene.stream.flush(timeout_sec=_FLUSH_S)
+            except RuntimeError as error:
+                said = str(error).partition(",")[0]
+                raise BslamError(f"--rerun: its viewer has gone ({said}); {_INTO_A_FILE}") from error
             return
         time.sleep(_POLL_S)
 

@@ -35,7 +35,13 @@ class Stream:
     def log(self, entity: str, content: Any, static: bool = False) -> None:
         self.logged.append((-1.0 if static else self.time_s, entity, content))
 
-    def flush(self) -> None:
+    def spawn(self) -> None:
+        self.saved = "viewer"
+
+    def flush(self, *, timeout_sec: float) -> None:
+        assert timeout_sec < 60.0
+        if self.saved == "viewer":
+            raise RuntimeError("gRPC connection severed: Unknown error, uri: x")
         self.flushed = True
 
     def disconnect(self) -> None:
@@ -98,6 +104,42 @@ def test_what_cannot_be_followed_is_one_line(
     assert main(["live", "paper_room", "--rerun", target]) == 2
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1
+
+
+def test_without_a_screen_a_file_is_offered(
+    tmp_path: Path,
+    rerun: type[Stream],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    words = ["live", str(short_room(tmp_path)), "--speed", "inf", "--out", str(tmp_path / "out"), "--rerun"]
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert main(words) == 2
+    assert "--rerun: no screen for its viewer here; allowed: --rerun FILE.rrd" in capsys.readouterr().err
+    assert rerun.made == []
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "its viewer has gone (gRPC connection severed: Unknown error); allowed: --rerun FILE.rrd" in told
+
+
+def test_a_stopped_run_says_what_is_left(
+    tmp_path: Path,
+    rerun: type[Stream],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bslam.commands.live.follow", stop)
+    file = tmp_path / "room.rrd"
+    words = ["live", str(short_room(tmp_path)), "--rerun", str(file), "--out", str(tmp_path / "out")]
+    assert main(words) == 1
+    assert f": {file} ends there\n" in capsys.readouterr().out
 
 
 def test_a_run_that_cannot_be_leaves_the_file(tmp_path: Path, rerun: type[Stream]) -> None:
