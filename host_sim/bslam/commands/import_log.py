@@ -26,24 +26,22 @@ EXAMPLES = f"""examples:
   bslam import ros2 drive.mcap --joints /joint_states --wheel-radius 0.033 --wheelbase 0.16
   bslam import ros2 drive.mcap --detections /tf --truth /mocap/pose --mount 0.1,0,0
 
-BAG is a rosbag2 folder, FILE.mcap or FILE.db3; `pip install rosbags` brings what reads it, no ROS is needed.
+BAG: a rosbag2 folder, FILE.mcap or FILE.db3; `pip install rosbags` reads it, without ROS.
 Markers: AprilTagDetectionArray (apriltag_msgs, Isaac ROS), ArucoMarkers, ArucoDetection, MarkerArray
-(aruco_msgs), Detection3DArray, or /tf with frames such as tag36h11:5. A topic that is not named is the only
-one of its kind. Where the camera sits comes from /tf_static. Stamps are those of the headers.
+(aruco_msgs), Detection3DArray; or --detections /tf, with frames such as tag36h11:5. A topic that is not named
+is the only one of its kind. Where the camera sits comes from /tf_static. Stamps are those of the headers.
 --tags: {HELP}
 Then: bslam check DIR, bslam replay csv DIR. Exit status 2: the last line says what is missing."""
 
-_MOUNT_HELP = (
-    "the camera, m and rad, in place of /tf_static; level if no pitch is given (positive: it looks down)"
-)
+_MOUNT_HELP = "in place of /tf_static; no PITCH: level; > 0: it looks down"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("format", choices=["ros2"], metavar="ros2", help="what the log is of")
+    parser.add_argument("format", type=_format, metavar="ros2", help="what the log is of")
     parser.add_argument("bag", type=Path, metavar="BAG", help="rosbag2 folder, FILE.mcap or FILE.db3")
     parser.add_argument("--odometry", metavar="TOPIC", help="nav_msgs/Odometry: poses become wheel travel")
-    parser.add_argument("--detections", metavar="TOPIC", help="the markers")
+    parser.add_argument("--detections", action=_Once, metavar="TOPIC", help="the markers of one camera")
     parser.add_argument("--joints", metavar="TOPIC", help="sensor_msgs/JointState in place of --odometry")
     parser.add_argument("--left-joint", metavar="NAME", help="default: the one with 'left' and 'wheel'")
     parser.add_argument("--right-joint", metavar="NAME", help="default: the one with 'right' and 'wheel'")
@@ -71,6 +69,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="the log folder; a log there is replaced (default: out/import/BAG)",
     )
+
+
+def _format(word: str) -> str:
+    if word != "ros2":
+        hint = f"; did you mean: bslam import ros2 {word}" if Path(word).exists() else ""
+        raise argparse.ArgumentTypeError(f"'{word}' does not exist; allowed: ros2{hint}")
+    return word
+
+
+class _Once(argparse.Action):
+    """An option that would lose what it was given before."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        before = getattr(namespace, self.dest)
+        if before is not None:
+            raise BslamError(f"{option_string} {before} and {values}: allowed: one topic; a log per camera")
+        setattr(namespace, self.dest, values)
 
 
 def execute(arguments: argparse.Namespace) -> int:

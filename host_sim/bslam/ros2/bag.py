@@ -14,6 +14,7 @@ from tqdm import tqdm
 from bslam.errors import BslamError
 from bslam.ros2.definitions import DEFINITIONS
 
+TF_STATIC: Final = "/tf_static"
 INSTALL: Final = "pip install rosbags"
 _IDL_SEPARATOR: Final = "=" * 80 + "\n"
 _TOPICS_MAX: Final = 30
@@ -45,6 +46,9 @@ class Bag:
         self.counts: dict[str, int] = dict.fromkeys(self.topics, 0)
         for one in self._reader.connections:
             self.counts[one.topic] += one.msgcount
+        if not any(self.counts.values()):
+            self._reader.close()
+            raise BslamError(f"{path}: holds no messages at all; allowed: a bag with some")
 
     @property
     def start_ns(self) -> int:
@@ -71,27 +75,29 @@ class Bag:
 
         Raises BslamError if there is no such topic, it is of another kind, or there are several.
         """
-        fit = [name for name, kind in self.topics.items() if kind in kinds]
+        fit = self.fitting(kinds)
         if topic is None:
             if len(fit) > 1:
                 raise BslamError(f"{self.path}: several topics fit {option}; allowed: {self._listed(fit)}")
             return (fit[0], self.topics[fit[0]]) if fit else None
         if topic not in self.topics:
-            near = difflib.get_close_matches(topic, self.topics, 1, 0.4)
+            near = difflib.get_close_matches(topic, fit, 1, 0.4)
             hint = f", did you mean {near[0]}?" if near else ""
-            raise BslamError(
-                f"{self.path}: no topic {topic} ({option}){hint}; allowed: {self.listing(kinds)}"
-            )
+            raise BslamError(f"{self.path}: no topic {topic} ({option}){hint}; allowed: {self.offer(kinds)}")
         if self.topics[topic] not in kinds:
             said = f"{self.path}: topic {topic} ({option}) is of type {self.topics[topic]}"
-            raise BslamError(
-                f"{said}; allowed: {', '.join(kinds)}; in the bag: {self._listed(fit) or 'none'}"
-            )
+            raise BslamError(f"{said}; allowed: {self.offer(kinds)}; types: {', '.join(kinds)}")
         return topic, self.topics[topic]
 
-    def listing(self, kinds: Sequence[str] = ()) -> str:
-        """The topics with their types, those of these kinds first."""
-        return self._listed(sorted(self.topics, key=lambda name: self.topics[name] not in kinds)) or "none"
+    def fitting(self, kinds: Sequence[str]) -> list[str]:
+        """The topics of these kinds; nothing that is asked for moves in /tf_static."""
+        return [name for name, kind in self.topics.items() if kind in kinds and name != TF_STATIC]
+
+    def offer(self, kinds: Sequence[str]) -> str:
+        """The topics of these kinds; if there are none, what there is."""
+        fit = self.fitting(kinds)
+        there = self._listed(list(self.topics))
+        return f"one of {self._listed(fit)}" if fit else f"another bag (in this one: {there})"
 
     def _listed(self, names: Sequence[str]) -> str:
         rest = [f"and {len(names) - _TOPICS_MAX} more"] if len(names) > _TOPICS_MAX else []
@@ -141,8 +147,9 @@ def _require_bag(path: Path) -> None:
     if not path.exists():
         raise BslamError(f"{path}: no such bag; {allowed}")
     if path.is_dir() and not (path / "metadata.yaml").exists():
-        there = ", ".join(one.name for one in sorted(path.iterdir()) if one.suffix in (".mcap", ".db3"))
-        raise BslamError(f"{path}: no metadata.yaml in it (bags: {there or 'none'}); {allowed}")
+        there = [one for one in sorted(path.iterdir()) if one.suffix in (".mcap", ".db3")]
+        alone = f", as {there[0]}, which is in it" if there else ""
+        raise BslamError(f"{path}: no metadata.yaml in it; {allowed}{alone}")
     if not path.is_dir() and path.suffix not in (".mcap", ".db3"):
         raise BslamError(f"{path}: no bag; {allowed}")
 

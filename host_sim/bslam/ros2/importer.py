@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.log import Log, Robot, Sightings, Truth
 from bslam.parsing.settings import parse_table
-from bslam.ros2.bag import Bag, name_of
+from bslam.ros2.bag import TF_STATIC, Bag, name_of
 from bslam.ros2.geometry import Camera, Mount, Transform, base_on, looks_down_rad, pose_in
 from bslam.ros2.messages import (
     CAMERA_INFO,
@@ -39,7 +39,6 @@ from bslam.ros2.stamps import in_order, without_repeats
 from bslam.ros2.tags import TagSizes
 from bslam.ros2.wheels import Gyro, Joints, Poses, Travel, gyro_means, travel_of_joints, travel_of_poses
 
-TF_STATIC: Final = "/tf_static"
 WHEELBASE_M: Final = 0.3
 # What a wheeled robot and a detector of tags have about; whoever knows better says so.
 GUESSES: Final[Mapping[str, Any]] = {
@@ -155,7 +154,8 @@ def import_bag(path: Path, request: Request) -> Imported:
 
 
 def _choose(bag: Bag, request: Request) -> _Chosen:
-    detections = bag.topic_of("--detections", request.detections, _without_tf(bag, request))
+    kinds = list(DETECTIONS) if request.detections else [kind for kind in DETECTIONS if kind != TF]
+    detections = bag.topic_of("--detections", request.detections, kinds)  # /tf alone may have no tags
     joints = bag.topic_of("--joints", request.joints, [JOINTS]) if request.joints else None
     if joints is None or request.odometry:
         odometry = bag.topic_of("--odometry", request.odometry, [ODOMETRY])
@@ -163,13 +163,13 @@ def _choose(bag: Bag, request: Request) -> _Chosen:
         odometry = None
     if odometry is None and joints is None:
         raise BslamError(
-            f"{bag.path}: no topic of type {ODOMETRY}; allowed: --odometry TOPIC or --joints TOPIC of "
-            f"{bag.listing([ODOMETRY, JOINTS])}"
+            f"{bag.path}: no topic of type {ODOMETRY}; --odometry or --joints TOPIC: allowed: "
+            f"{bag.offer([ODOMETRY, JOINTS])}"
         )
     if detections is None:
         raise BslamError(
-            f"{bag.path}: no topic of markers; allowed: --detections TOPIC of "
-            f"{bag.listing(list(DETECTIONS))}; types: {', '.join(DETECTIONS)}"
+            f"{bag.path}: no topic of markers; --detections TOPIC: allowed: "
+            f"{bag.offer(list(DETECTIONS))}; types: {', '.join(DETECTIONS)}"
         )
     truth, _, truth_frame = (request.truth or "").partition(":")
     if request.truth is not None and not truth:
@@ -186,12 +186,6 @@ def _choose(bag: Bag, request: Request) -> _Chosen:
     if chosen.truth and chosen.truth[1] == TF and not truth_frame:
         raise BslamError(f"--truth {truth}: which frame of it? allowed: --truth {truth}:CHILD_FRAME")
     return chosen
-
-
-def _without_tf(bag: Bag, request: Request) -> list[str]:
-    """Types of markers; /tf is in every bag, so it counts only where it is named."""
-    named = request.detections is not None and bag.topics.get(request.detections) == TF
-    return [kind for kind in DETECTIONS if kind != TF or named]
 
 
 def _camera_topics(bag: Bag, request: Request, detections: tuple[str, str]) -> tuple[str, ...]:
@@ -306,9 +300,7 @@ def _of_base(read: _Read, base: str, path: Path) -> Poses:
     try:
         pose = base_on(read.tree, read.child, base)
     except BslamError as error:
-        raise BslamError(
-            f"{path}: {error} (frames: {_frames(read)}); allowed: --base FRAME of these, or no --base"
-        ) from None
+        raise BslamError(f"{path}: {error}{_base_of(read)}no --base") from None
     return read.poses.of_part(pose)
 
 
@@ -322,8 +314,10 @@ def _pose_in(read: _Read, base: str, frame: str, path: Path) -> Transform | None
     return pose
 
 
-def _frames(read: _Read) -> str:
-    return ", ".join(sorted(read.tree.keys() | {parent for parent, _ in read.tree.values()})) or "none"
+def _base_of(read: _Read) -> str:
+    """How a message offers the frames that there are, or another way, which follows."""
+    frames = ", ".join(sorted(read.tree.keys() | {parent for parent, _ in read.tree.values()}))
+    return f"; allowed: --base FRAME of {frames}; or " if frames else " (it has no frames); allowed: "
 
 
 def _wheelbase(request: Request) -> float | None:
@@ -365,7 +359,9 @@ def _markers(read: _Read, chosen: _Chosen, request: Request, path: Path, notes: 
     if kind in CORNERS:
         sizes.require({one.identity for one in detections}, topic)
     elif request.sizes is not None:
-        raise BslamError(f"{topic}: {kind} tells places, so sizes of tags have no use; allowed: no --tags")
+        raise BslamError(
+            f"{topic}: {kind} tells places, so sizes of tags have no use; allowed: no --tags, no --tag-size"
+        )
     frames = sorted({frame.frame_id for frame in read.frames if frame.detections})
     poses = {frame: _camera_pose(read, request, frame, path, notes) for frame in frames}
     return Markers(poses, sizes, _camera(read, request, frames, kind in CORNERS), request.pixel_sd)
@@ -383,8 +379,8 @@ def _camera_pose(read: _Read, request: Request, frame: str, path: Path, notes: l
     pose = _pose_in(read, base, frame, path)
     if pose is None:
         raise BslamError(
-            f"{path}: {TF_STATIC} has no way from {base} to {frame}, the camera's frame (frames: "
-            f"{_frames(read)}); allowed: --base FRAME of these, or --mount X_M,Y_M,YAW_RAD of the camera"
+            f"{path}: {TF_STATIC} has no way from {base} to {frame}, the camera's frame"
+            f"{_base_of(read)}--mount X_M,Y_M,YAW_RAD of the camera"
         )
     return pose
 

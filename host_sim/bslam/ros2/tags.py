@@ -11,9 +11,9 @@ import numpy as np
 
 from bslam.errors import BslamError
 from bslam.parsing.csvtable import Column, read_table
-from bslam.parsing.settings import Rule, check_keys, load_toml, number
+from bslam.parsing.settings import Rule, check_keys, load_toml
 
-SIDE_M: Final = number(1e-3, 10.0)
+SIDE_M: Final = Rule("metres, from 0.001 to 10, as 0.16", float, lambda side: 1e-3 <= side <= 10.0)
 _SIDES: Final = Rule("a table, tag = side in metres", dict)
 _NAMED_MAX: Final = 8
 HELP: Final = (
@@ -39,9 +39,11 @@ class TagSizes:
         if unknown:
             more = f" and {len(unknown) - _NAMED_MAX} more" if len(unknown) > _NAMED_MAX else ""
             first = unknown[0].rpartition(":")[2]
+            table = f"for all, or --tags FILE.toml with `{first} = 0.16` below `[side_m]`"
+            rest = "for these, too, or their rows in the file of --tags"
+            mend = f"--tag-size METRES {rest if self.side_m else table}"
             raise BslamError(
-                f"{where}: size of tags {', '.join(unknown[:_NAMED_MAX])}{more} unknown; allowed: "
-                f"--tag-size METRES for all, or --tags FILE.toml with `{first} = 0.16` below `[side_m]`"
+                f"{where}: size of tags {', '.join(unknown[:_NAMED_MAX])}{more} unknown; allowed: {mend}"
             )
 
 

@@ -49,7 +49,7 @@ def open_stream(target: str) -> Any:
     try:
         stream.spawn() if target == "viewer" else stream.save(target)
     except (OSError, RuntimeError) as error:
-        raise BslamError(f"--rerun {target}: {error}") from error
+        raise BslamError(f"--rerun {target}: {str(error).strip().partition(chr(10))[0]}") from error
     return stream
 
 

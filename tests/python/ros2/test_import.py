@@ -216,12 +216,15 @@ def test_a_mount_without_a_pitch_says_that_it_takes_the_camera_for_level(
 BAD = {
     "{tags} --tag-size 0.3": "the camera distorts; allowed: --image rectified",
     "{tags} --image raw": "size of tags tag36h11:0, tag36h11:1",
-    "{tags} --image raw --tag-size 300": "--tag-size: 300.0 is not allowed",
+    "{tags} --image raw --tags {tmp}/sizes.csv": "allowed: --tag-size METRES for these, too, or their rows",
+    "{tags} --image raw --tag-size 300": "--tag-size: 300.0 is not allowed; allowed: metres",
+    "{tags} --imu /imu": "no topic /imu (--imu); allowed: another bag (in this one: /",
+    "{aruco} --detections /a --detections /b": "--detections /a and /b: allowed: one topic",
     "{tags} --odometry /odm": "no topic /odm (--odometry), did you mean /odom?",
-    "{tags} --detections /odom": "topic /odom (--detections) is of type nav_msgs/msg/Odometry; allowed: ap",
+    "{tags} --detections /odom": "is of type nav_msgs/msg/Odometry; allowed: one of /ap",
     "{tags} --joints /joint_states --image raw --tag-size 0.3": "--wheel-radius METRES, which is missing",
     "{tags} --joints /joint_states --left-joint l --wheel-radius 0.1 --wheelbase 0.3": "--left-joint",
-    "{aruco} --tag-size 0.3": "sizes of tags have no use",
+    "{aruco} --tag-size 0.3": "sizes of tags have no use; allowed: no --tags, no --tag-size",
     "{aruco} --base nowhere": "no way from base_link, the odometry's frame, to nowhere",
     "{aruco} --mount 1,2": "allowed: X_M,Y_M,YAW_RAD",
     "{aruco} --truth /tf_static": "--truth /tf_static:CHILD_FRAME",
@@ -233,7 +236,7 @@ BAD = {
     "{aruco} --set wheelbase_m": "allowed: KEY=VALUE",
     "{aruco} --wheelbase 300": "--wheelbase: 300.0 is not allowed",
     "{tmp}/none": "no such bag",
-    "{tmp}": "no metadata.yaml in it",
+    "{tmp}": "FILE.mcap or FILE.db3, as {tmp}/old.mcap, which is in it",
     "{tmp}/old.bag": "rosbags-convert",
 }
 
@@ -242,7 +245,10 @@ BAD = {
 def test_bad_requests_are_one_line(
     tmp_path: Path, aruco: Path, tags: Path, capsys: pytest.CaptureFixture[str], words: str, said: str
 ) -> None:
-    assert_refused(tmp_path, words.format(aruco=aruco, tags=tags, tmp=tmp_path), said, capsys)
+    (tmp_path / "sizes.csv").write_text("id,side_m\n0,0.16\n")
+    (tmp_path / "old.mcap").write_bytes(b"")
+    words = words.format(aruco=aruco, tags=tags, tmp=tmp_path)
+    assert_refused(tmp_path, words, said.replace("{tmp}", str(tmp_path)), capsys)
 
 
 def assert_refused(tmp_path: Path, words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -415,9 +421,24 @@ def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
     start = replace(drive, log=_beginning(drive.log))
     odometry, aruco, static = list(start.odometry()), list(start.aruco()), list(start.static())
     thing = [(EPOCH_NS, "/thing", MADE_UP, new(MADE_UP, header=header(EPOCH_NS)))]
-    yield "no markers", [*odometry, *static], "no topic of markers"
+    tags = list(start.tag_frames())
+    yield (
+        "no markers",
+        [*odometry, *static],
+        "allowed: another bag (in this one: /",
+    )
+    yield (
+        "tags in tf",
+        [*odometry, *static, *tags],
+        "--detections TOPIC: allowed: one of /tf (tf2_msgs/msg/TF",
+    )
+    yield "nothing", [], "holds no messages at all"
     yield "no odometry", [*aruco, *static, *thing], "no topic of type nav_msgs/msg/Odometry"
-    yield "no mount", [*odometry, *aruco], "/tf_static has no way from base_link to camera_optical_frame"
+    yield (
+        "no mount",
+        [*odometry, *aruco],
+        "to camera_optical_frame, the camera's frame (it has no frames); al",
+    )
     yield "no camera", [*odometry, *start.apriltags(), *static], "no sensor_msgs/msg/CameraInfo is there"
     yield (
         "two odometries",

@@ -121,6 +121,7 @@ def test_a_set_that_the_data_directory_does_not_have_is_named_with_those_it_has(
         (["check", "my_drvie"], "did you mean: bslam check csv my_drive"),
         (["replay", "my_bag"], "did you mean: bslam import ros2 my_bag"),
         (["check", "my_bag"], "did you mean: bslam import ros2 my_bag"),
+        (["import", "my_bag"], "did you mean: bslam import ros2 my_bag"),
         (["live", "my_bag"], "did you mean: bslam import ros2 my_bag"),
         (["replay", "my_bag/my_bag.db3"], "did you mean: bslam import ros2 my_bag/my_bag.db3"),
         (["replay", "csv", "my_bag"], "my_bag"),
