@@ -12,30 +12,33 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from types import ModuleType
 
-from bslam.commands import (
-    calibrate,
-    check,
-    compare,
-    console,
-    detect,
-    export,
-    faults,
-    import_log,
-    kept_maps,
-    live,
-    look,
-    params,
-    replay,
-    report_page,
-    run,
-    scenario,
-    stress,
-    sweep,
-    tables,
-)
-from bslam.commands.helping import ShortHelp
-from bslam.commands.parser import Parser
-from bslam.errors import BslamError, did_you_mean
+try:
+    from bslam.commands import (
+        calibrate,
+        check,
+        compare,
+        console,
+        detect,
+        export,
+        faults,
+        import_log,
+        kept_maps,
+        live,
+        look,
+        params,
+        replay,
+        report_page,
+        run,
+        scenario,
+        stress,
+        sweep,
+        tables,
+    )
+    from bslam.commands.helping import ShortHelp
+    from bslam.commands.parser import Parser
+    from bslam.errors import BslamError, did_you_mean
+except KeyboardInterrupt:  # they take a second or two
+    sys.exit("bslam: stopped")
 
 COMMANDS: dict[str, ModuleType] = {
     "run": run,

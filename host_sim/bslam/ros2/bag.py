@@ -78,7 +78,9 @@ class Bag:
         fit = self.fitting(kinds)
         if topic is None:
             if len(fit) > 1:
-                raise BslamError(f"{self.path}: several topics fit {option}; allowed: {self._listed(fit)}")
+                raise BslamError(
+                    f"{self.path}: several topics fit {option}; allowed: one of {self._listed(fit)}"
+                )
             return (fit[0], self.topics[fit[0]]) if fit else None
         if topic not in self.topics:
             near = difflib.get_close_matches(topic, fit, 1, 0.4)

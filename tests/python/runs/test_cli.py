@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -138,6 +139,18 @@ def test_a_folder_that_is_said_otherwise_is_met_with_the_line_to_type(
     assert status_of(words) == 2
     line = last_line(capsys)
     assert line.endswith(said) and "allowed: " in line and "BSLAM_DATA" not in line
+
+
+def test_ctrl_c_during_the_imports_is_one_line(tmp_path):
+    (tmp_path / "scipy.py").write_text("raise KeyboardInterrupt")
+    made = subprocess.run(
+        [sys.executable, "-m", "bslam", "--version"],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (made.returncode, made.stdout, made.stderr) == (1, "", "bslam: stopped\n")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
