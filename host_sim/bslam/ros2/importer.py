@@ -464,8 +464,9 @@ def _robot(
     ]
     if is_told and markers.camera is not None:
         lines.append(
-            f"guessed: corners err by {markers.pixel_sd:g} px (--pixel-sd); beside it a bearing by "
-            f"{BEARING_LEFT_RAD:g} rad and a range by {100 * RANGE_LEFT:g} %"
+            f"guessed: corners err by {markers.pixel_sd:g} px (--pixel-sd); the sd columns hold that, and "
+            f"{BEARING_LEFT_RAD:g} rad and {100 * RANGE_LEFT:g} % of the range, which calibration leaves: "
+            "such errors last, so they scatter less than the sd says"
         )
     return robot, [*lines, *([view_said] if "field_of_view_rad" not in request.robot else [])]
 
