@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -76,7 +77,9 @@ def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     entries = []
     settings = _settings(arguments)
-    for name, check in list(_checks(arguments.logs, arguments.robot)):
+    checks = list(_checks(arguments.logs, arguments.robot))
+    _remove_pictures(arguments.out)
+    for name, check in checks:
         report = check(settings)
         entries.append(_entry(name, report, arguments.out))
         print(replace(report, name=name))
@@ -156,6 +159,14 @@ def _saved(name: str, number: int, one: Finding, out: Path) -> dict[str, Any]:
     file = f"{name}.{number}.png"
     write_atomically(out / file, png(draw_picture(one.picture, one.what)))
     return _words(one) | {"picture": file}
+
+
+def _remove_pictures(out: Path) -> None:
+    """Those that the summary there names: it is replaced, and they are of another check."""
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        entries = json.loads((out / "summary.json").read_text(encoding="utf-8"))["logs"]
+        for one in (one for entry in entries for one in entry["findings"] if "picture" in one):
+            (out / Path(one["picture"]).name).unlink(missing_ok=True)
 
 
 def _pictures(entries: list[dict[str, Any]]) -> bool:

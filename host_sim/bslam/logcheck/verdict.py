@@ -141,7 +141,7 @@ def _size(placed: Fitted, unit: float) -> Finding:
         what, sure = f"distances of sightings are {100.0 * abs(1.0 / scale - 1.0):.1f} % too {side}", what
         mend = f"multiply range_m of sightings.csv, or the sizes of the things seen, by {scale:.4g}"
     kind = "scale" if unit == 1.0 else "units"
-    return Finding(kind, what, sure, mend, {"scale": scale}, _map_picture(placed))
+    return Finding(kind, what, sure, mend, {"scale": scale}, _map_picture(placed, 1.0 / scale))
 
 
 def _or_distances(one: Finding, way: float) -> Finding:
@@ -287,6 +287,9 @@ def _exchange(both: list[Exchange], solution: Solution, log: Log) -> Finding:
     )
 
 
-def _map_picture(fitted: Fitted) -> Picture:
-    pairs = (("map", fitted.estimate), (fitted.what, fitted.reference))
+def _map_picture(fitted: Fitted, size: float = 1.0) -> Picture:
+    """The estimate, grown about the middle, and the reference; size: one that undoes the alignment's."""
+    middle = np.mean(fitted.reference)
+    estimate = middle + size * (fitted.estimate - middle)
+    pairs = (("map" if len(fitted.names) else "path", estimate), (fitted.what, fitted.reference))
     return Picture("x, m", "y, m", [Curve(label, points.real, points.imag) for label, points in pairs])

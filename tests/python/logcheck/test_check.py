@@ -182,6 +182,9 @@ def test_check_ranges_and_a_way_that_differ_are_blamed_on_one_only_where_somethi
     assert float(distances.split()[-1]) == pytest.approx(0.8, rel=0.02)
     one = the_one(long)
     assert one.what.startswith("distances of sightings are 2") and one.what.endswith("% too long")
+    path, truth = one.picture.curves
+    assert (path.label, truth.label) == ("path", "truth.csv")
+    assert np.ptp(path.x) == pytest.approx(1.25 * np.ptp(truth.x), rel=0.05)
     assert float(one.mend.split()[-1]) == pytest.approx(0.8, rel=0.03)
     short = with_odometry(log, a=0.8 * log.odometry.a, b=0.8 * log.odometry.b)
     short = with_robot(short, wheelbase_m=0.8 * log.robot.wheelbase_m)

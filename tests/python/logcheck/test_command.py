@@ -56,6 +56,17 @@ def test_check_a_good_folder_exits_0_and_writes_the_summary(folder, tmp_path, ca
     assert [path.name for path in out.iterdir()] == ["summary.json"]
 
 
+def test_check_leaves_no_picture_of_an_earlier_check(folder, tmp_path):
+    turned = tmp_path / "turned"
+    log = made_up(seconds=40.0)
+    with_sightings(log, bearing_rad=-log.sightings.bearing_rad).write(turned)
+    _, _, out = check(tmp_path, turned)
+    (out / "mine.1.png").write_bytes(b"")
+    assert (out / "turned.1.png").exists()
+    check(tmp_path, folder)
+    assert sorted(path.name for path in out.iterdir()) == ["mine.1.png", "summary.json"]
+
+
 def test_check_a_finding_exits_1_with_a_picture_and_what_mends_it(folder, tmp_path, capsys):
     log = made_up(seconds=40.0)
     with_sightings(log, bearing_rad=-log.sightings.bearing_rad).write(folder)
