@@ -64,9 +64,12 @@ def room(
     )
     if evaluation is None:
         return shown
+    title = name + _ALIGNED[evaluation.align]
+    if log.truth is not None and log.beacons is not None and evaluation.align != "none":
+        title += "\nbeacons go with the path; map cm of the table has them aligned by themselves"
     return replace(
         shown,
-        title=name + _ALIGNED[evaluation.align],
+        title=title,
         truth_m=evaluation.truth[:, :2] if log.truth is not None else None,
         beacons=log.beacons,
         identity=log.identity,

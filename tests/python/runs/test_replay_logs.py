@@ -90,6 +90,8 @@ def test_the_picture_brings_path_and_beacons_to_the_truth_by_one_transform(drive
     run = replace(away, beacons=None).run(association="known")
     shown = room("away", run.log, run.trace, run.errors, np.empty((0, 4)))
     assert shown.title == "away (rigidly aligned with the truth)"
+    with_map = room("away", away, run.trace, run.errors, np.empty((0, 4)))
+    assert with_map.title.startswith(f"{shown.title}\nbeacons go with the path; map cm")
     assert np.abs(shown.estimate_m - shown.truth_m).max() < 0.2
     true_m = {str(one): place for one, *place in zip(*vars(away.beacons).values(), strict=True)}
     assert {one.name for one in shown.mapped} == set(true_m)
