@@ -4,7 +4,17 @@
 #include <bslam.h>
 
 // Your robot: pins of each encoder's two channels, and its measures (docs/TUNING.md says how to find them).
+// Those of an ESP32 are no flash, console, USB, or level that is read at the start; on it Serial1 has no pin of
+// its own, and listens on DETECTOR_RX.
+#if CONFIG_IDF_TARGET_ESP32C3
+const int LEFT_A = 3, LEFT_B = 4, RIGHT_A = 5, RIGHT_B = 6, DETECTOR_RX = 7;
+#elif CONFIG_IDF_TARGET_ESP32C6
+const int LEFT_A = 18, LEFT_B = 19, RIGHT_A = 20, RIGHT_B = 21, DETECTOR_RX = 22;
+#elif defined ESP32  // the first one, S2, S3
+const int LEFT_A = 4, LEFT_B = 13, RIGHT_A = 14, RIGHT_B = 18, DETECTOR_RX = 21;
+#else
 const int LEFT_A = 2, LEFT_B = 4, RIGHT_A = 3, RIGHT_B = 5;
+#endif
 const float WHEELBASE_M = 0.2f, WHEEL_RADIUS_M = 0.033f, CAMERA_AHEAD_M = 0.05f;
 const int TICKS_PER_REVOLUTION = 1440;  // edges of channel A in a turn of the wheel
 const int64_t STEP_US = 40000;
@@ -34,7 +44,11 @@ static int64_t now_us() {
 
 void setup() {
   Serial.begin(115200);
-  Serial1.begin(115200);  // on an ESP32 with its pins: Serial1.begin(115200, SERIAL_8N1, RX, TX)
+#ifdef ESP32
+  Serial1.begin(115200, SERIAL_8N1, DETECTOR_RX);
+#else
+  Serial1.begin(115200);
+#endif
   const int pins[] = {LEFT_A, LEFT_B, RIGHT_A, RIGHT_B};
   for (int pin : pins) {
     pinMode(pin, INPUT_PULLUP);

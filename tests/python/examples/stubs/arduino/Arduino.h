@@ -7,6 +7,10 @@
 #include <stdio.h>
 
 enum { INPUT_PULLUP = 2, CHANGE = 1 };
+#ifdef ESP32
+#define IRAM_ATTR
+enum { SERIAL_8N1 = 0x800001c };
+#endif
 
 void pinMode(int pin, int mode);
 int digitalRead(int pin);
@@ -19,6 +23,9 @@ void delay(unsigned long ms);
 
 struct SerialPort {
     void begin(unsigned long baud);
+#ifdef ESP32
+    void begin(unsigned long baud, uint32_t config, int8_t rx_pin, int8_t tx_pin = -1);
+#endif
     int available();
     int read();
     void println(const char *text);

@@ -8,8 +8,8 @@
 
 static const uint32_t FIRST_MICROS = 4284967296u;  // 10 s before it begins again
 static int64_t time_us = 0;
-static void (*handlers[8])() = {};
-static int levels[8] = {};
+static void (*handlers[64])() = {};
+static int levels[64] = {}, pins[4] = {}, pin_count = 0;  // A and B of the left wheel, then of the right one
 static long done[2] = {};
 static bool masked = false;
 static char heard[512];
@@ -17,8 +17,9 @@ static size_t heard_length = 0, heard_read = 0;
 
 SerialPort Serial, Serial1;
 
-void pinMode(int, int)
+void pinMode(int pin, int)
 {
+    pins[pin_count++] = pin;
 }
 
 int digitalRead(int pin)
@@ -49,7 +50,7 @@ void noInterrupts()
 /// Channel B leads by a quarter of a period where the wheel goes ahead: at an edge of A they differ.
 static void turn(int wheel)
 {
-    const int a = wheel == 0 ? 2 : 3, b = wheel == 0 ? 4 : 5;
+    const int a = pins[2 * wheel], b = pins[2 * wheel + 1];
     for (; done[wheel] < drive_ticks(time_us, wheel == 0 ? -1 : 1); done[wheel]++) {
         levels[a] = !levels[a];
         levels[b] = !levels[a];
@@ -80,6 +81,12 @@ void delay(unsigned long)
 void SerialPort::begin(unsigned long)
 {
 }
+
+#ifdef ESP32
+void SerialPort::begin(unsigned long, uint32_t, int8_t, int8_t)
+{
+}
+#endif
 
 int SerialPort::available()
 {
