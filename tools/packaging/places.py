@@ -16,7 +16,7 @@ def tracked(root: Path, *folders: str) -> list[str]:
     command = ["git", "-C", str(root), "ls-files", "-z", "--", *folders]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode != 0:
-        raise PackagingError(f"{root} is no git repository: {done.stderr.strip()}")
+        raise PackagingError(f"{root} is no git repository; clone it with git: {done.stderr.strip()}")
     names = done.stdout.split("\0")[:-1]
     missing = [name for name in names if not (root / name).is_file()]
     if missing:

@@ -489,5 +489,5 @@ def test_a_file_that_is_gone_stops_it(
 
 def test_outside_git_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "no").mkdir()
-    with pytest.raises(places.PackagingError, match="is no git repository"):
+    with pytest.raises(places.PackagingError, match="is no git repository; clone it with git: "):
         places.tracked(tmp_path / "no")
