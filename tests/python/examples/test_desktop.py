@@ -246,6 +246,31 @@ def test_camera_tags_says_in_a_line_what_the_filter_refuses(tmp_path: Path) -> N
     assert line.startswith("camera_tags: odometry at 10000000 us") and "BSLAM_E_TIME" in line
 
 
+def test_a_live_camera_s_tags_are_said_as_the_robots_hear_them(tmp_path: Path) -> None:
+    """By the program of its README, with two pictures for a camera."""
+    readme = (CAMERA_TAGS.parent / "README.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
+    assert program.count("VideoCapture(0)") == 1
+    colour = cv2.cvtColor(tag_room.picture(tag_room.pose_at(0)), cv2.COLOR_GRAY2BGR)
+    for number in (0, 1):
+        cv2.imwrite(str(tmp_path / f"film_{number}.png"), colour)
+    tag_room.write_camera(tmp_path)
+    (tmp_path / "say_tags.py").write_text(
+        program.replace("VideoCapture(0)", 'VideoCapture("film_%d.png", cv2.CAP_IMAGES)'), encoding="utf-8"
+    )
+    (tmp_path / "camera_tags.py").write_text(CAMERA_TAGS.read_text(encoding="utf-8"), encoding="utf-8")
+    lines = run(sys.executable, "say_tags.py", folder=tmp_path).stdout.splitlines()
+    assert len(lines) % 2 == 0 and len(lines) >= 4
+    true_tags = {number: (x_m, y_m) for number, x_m, y_m, _ in tag_room.TAGS}
+    for line in lines:
+        age_ms, tag, mrad, mm = map(int, line.split(" "))
+        x_m, y_m = true_tags[tag]
+        x_m -= tag_room.MOUNT_X_M
+        assert 30 <= age_ms < 5000
+        assert math.isclose(1e-3 * mrad, math.atan2(y_m, x_m), abs_tol=0.01)
+        assert math.isclose(1e-3 * mm, math.hypot(x_m, y_m), rel_tol=0.03)
+
+
 def test_camera_tags_says_that_there_is_no_picture(tmp_path: Path) -> None:
     tag_room.write_camera(tmp_path)
     done = run(sys.executable, CAMERA_TAGS, tmp_path, folder=tmp_path, expect=1)
