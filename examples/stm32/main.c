@@ -9,15 +9,15 @@ static bslam_t robot;  // all the memory that the filter has
 static int refused;    // readings and sightings that it did not take: bslam_status_name says why
 
 /// "AGE_MS TAG BEARING_MRAD RANGE_MM": a tag, left positive. It counts from when the picture was taken.
-static void take_sighting(const char *line)
+static void take_sighting(const char *line, int64_t now_us)
 {
     int age_ms = 0, tag = 0, mrad = 0, mm = 0;
-    char end[2];
-    const bool is_whole = sscanf(line, "%d %d %d %d%1[\r\n]", &age_ms, &tag, &mrad, &mm, end) == 5;
+    char more;
+    const int count = sscanf(line, "%d %d %d %d %c", &age_ms, &tag, &mrad, &mm, &more);
     const bslam_sighting_t seen = {
         .label = tag, .bearing_rad = 1e-3f * mrad, .range_m = 1e-3f * mm, .has_range = true};
-    // What is not whole is noise on the line.
-    refused += !is_whole || bslam_sightings(&robot, board_time_us() - 1000LL * age_ms, &seen, 1) != BSLAM_OK;
+    // EOF: a blank line, which is nothing. What is not four numbers is noise.
+    refused += count != EOF && (count != 4 || bslam_sightings(&robot, now_us - 1000LL * age_ms, &seen, 1));
 }
 
 static void listen_to_detector(void)
@@ -30,7 +30,7 @@ static void listen_to_detector(void)
         if (received[(uint8_t)(taken - 1)] == '\n') {
             line[length] = '\0';
             length = 0;
-            take_sighting(line);
+            take_sighting(line, board_time_us());
         }
     }
 }

@@ -4,28 +4,27 @@
 #include <bslam.h>
 
 // Your robot: pins of each encoder's two channels, and its measures (docs/TUNING.md says how to find them).
-// Those of an ESP32 are no flash, console, USB, or level that is read at the start; on it Serial1 has no pin of
-// its own, and listens on DETECTOR_RX.
-#if CONFIG_IDF_TARGET_ESP32C3
-const int LEFT_A = 3, LEFT_B = 4, RIGHT_A = 5, RIGHT_B = 6, DETECTOR_RX = 7;
-#elif CONFIG_IDF_TARGET_ESP32C6
-const int LEFT_A = 18, LEFT_B = 19, RIGHT_A = 20, RIGHT_B = 21, DETECTOR_RX = 22;
+// Those of an ESP32 are no flash, console, USB, or level that is read at the start; its Serial1 listens on
+// DETECTOR_RX.
+#if CONFIG_IDF_TARGET_ESP32C3 || CONFIG_IDF_TARGET_ESP32C6
+const int LEFT_A = 0, LEFT_B = 1, RIGHT_A = 3, RIGHT_B = 6, DETECTOR_RX = 7;
 #elif defined ESP32  // the first one, S2, S3
 const int LEFT_A = 4, LEFT_B = 13, RIGHT_A = 14, RIGHT_B = 18, DETECTOR_RX = 21;
 #else
 const int LEFT_A = 2, LEFT_B = 4, RIGHT_A = 3, RIGHT_B = 5;
+#define IRAM_ATTR  // of an ESP32: code of interrupts, which must not wait for flash
 #endif
-const float WHEELBASE_M = 0.2f, WHEEL_RADIUS_M = 0.033f, CAMERA_AHEAD_M = 0.05f;
+constexpr float WHEELBASE_M = 0.2f, WHEEL_RADIUS_M = 0.033f, CAMERA_AHEAD_M = 0.05f;
 const int TICKS_PER_REVOLUTION = 1440;  // edges of channel A in a turn of the wheel
 const int64_t STEP_US = 40000;
+static_assert(WHEELBASE_M >= 0.02f && WHEELBASE_M <= 2, "WHEELBASE_M: 0.02 to 2, in metres");
+static_assert(WHEEL_RADIUS_M >= 0.005f && WHEEL_RADIUS_M <= 0.5f, "WHEEL_RADIUS_M: 0.005 to 0.5, in metres");
+static_assert(CAMERA_AHEAD_M >= -1 && CAMERA_AHEAD_M <= 1, "CAMERA_AHEAD_M: -1 to 1, in metres");
 
-static bslam_t robot;         // all the memory that the filter has
-static unsigned refused = 0;  // readings and sightings that it did not take: bslam_status_name says why
+static bslam_t robot;                // all the memory that the filter has
+static unsigned refused = 0;         // lines, sightings and readings that were not taken
+static const char *reason = "none";  // of the last
 static volatile uint32_t left_ticks = 0, right_ticks = 0;
-
-#ifndef IRAM_ATTR  // on an ESP32: code of interrupts, which must not wait for flash
-#define IRAM_ATTR
-#endif
 
 static void IRAM_ATTR left_edge() {
   left_ticks += digitalRead(LEFT_A) == digitalRead(LEFT_B) ? -1 : 1;
@@ -38,8 +37,13 @@ static void IRAM_ATTR right_edge() {
 /// micros() begins again after 71 minutes; this does not.
 static int64_t now_us() {
   static int64_t now = 0;
-  now += (uint32_t)(micros() - (uint32_t)now);
-  return now;
+  return now += (uint32_t)(micros() - (uint32_t)now);
+}
+
+/// Counts what is refused, and keeps why.
+static void check(bool is_taken, const char *why) {
+  refused += !is_taken;
+  reason = is_taken ? reason : why;
 }
 
 void setup() {
@@ -65,8 +69,9 @@ void setup() {
   settings.counter_bits = 32;
   settings.mount_x_m = CAMERA_AHEAD_M;
   for (bslam_status_t status; (status = bslam_init(&robot, &settings, &bad_setting)) != BSLAM_OK;) {
-    Serial.println(bslam_status_name(status));  // one status names a setting
-    Serial.println(status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name : "");
+    Serial.println(bslam_status_name(status));  // of a setting, or BSLAM_E_SIZE
+    Serial.println(status == BSLAM_E_PARAMETER ? bslam_settings_info(bad_setting)->name
+                                               : "README: Sizes");
     delay(1000);
   }
 }
@@ -75,13 +80,18 @@ void setup() {
 static void take_sighting(const char *line) {
   int age_ms = 0, tag = 0, mrad = 0, mm = 0;
   char more;
-  const bool is_whole = sscanf(line, "%d %d %d %d%c", &age_ms, &tag, &mrad, &mm, &more) == 4;  // else noise
+  const int numbers = sscanf(line, "%d %d %d %d %c", &age_ms, &tag, &mrad, &mm, &more);
+  if (numbers != 4) {  // EOF: a blank line, which is nothing
+    check(numbers == EOF, "not four whole numbers");
+    return;
+  }
   bslam_sighting_t seen = {};
   seen.label = tag;
   seen.bearing_rad = 1e-3f * mrad;
   seen.range_m = 1e-3f * mm;
   seen.has_range = true;
-  refused += !is_whole || bslam_sightings(&robot, now_us() - 1000LL * age_ms, &seen, 1) != BSLAM_OK;
+  const bslam_status_t status = bslam_sightings(&robot, now_us() - 1000LL * age_ms, &seen, 1);
+  check(status == BSLAM_OK, bslam_status_name(status));
 }
 
 static void listen_to_detector() {
@@ -93,34 +103,38 @@ static void listen_to_detector() {
       line[length] = '\0';
       length = 0;
       take_sighting(line);
-    } else if (byte != '\r' && length < sizeof line - 1) {  // what is too long is noise to its end
+    } else if (length < sizeof line - 1) {  // what is too long is noise to its end
       line[length++] = byte;
     }
   }
 }
 
-static void read_wheels() {
+void loop() {
+  static int64_t step_us = 0, steps = 0;
+  listen_to_detector();
+  if (now_us() - step_us < STEP_US) {
+    return;
+  }
   bslam_odometry_reading_t wheels = {};
   noInterrupts();
   wheels.left_ticks = left_ticks;
   wheels.right_ticks = right_ticks;
   interrupts();
-  wheels.time_us = now_us();
+  wheels.time_us = step_us = now_us();
   wheels.source = BSLAM_ODOMETRY_TICKS;
-  refused += bslam_odometry(&robot, &wheels) != BSLAM_OK;
-}
+  const bslam_status_t status = bslam_odometry(&robot, &wheels);
+  check(status == BSLAM_OK, bslam_status_name(status));
 
-void loop() {
-  static int64_t step_us = 0;
-  listen_to_detector();
-  if (now_us() - step_us < STEP_US) {
-    return;
-  }
-  step_us = now_us();
-  read_wheels();
   const bslam_pose_t pose = bslam_pose(&robot);  // what your robot steers by
-  char text[80];
-  snprintf(text, sizeof text, "%d mm, %d mm, %d mrad, %d beacons, %u refused", (int)(1e3f * pose.x_m),
-           (int)(1e3f * pose.y_m), (int)(1e3f * pose.theta_rad), (int)bslam_health(&robot).beacons, refused);
+  char text[128];
+  snprintf(text, sizeof text, "%d mm, %d mm, %d mrad, %d beacons, %u refused (last: %s)",
+           (int)(1e3f * pose.x_m), (int)(1e3f * pose.y_m), (int)(1e3f * pose.theta_rad),
+           (int)bslam_health(&robot).beacons, refused, reason);
   Serial.println(text);
+  bslam_beacon_view_t tag;  // one of the map, at each step another
+  if (bslam_beacon(&robot, (int)(steps++ % BSLAM_BEACONS_MAX), &tag) == BSLAM_OK) {
+    const int x_mm = (int)(1e3f * tag.x_m), y_mm = (int)(1e3f * tag.y_m);
+    snprintf(text, sizeof text, "tag %d at %d mm, %d mm", (int)tag.label, x_mm, y_mm);
+    Serial.println(text);
+  }
 }

@@ -19,16 +19,19 @@ DRIVE_S = 42.0  # of stubs/drive.h
 
 def check_drive(printed: str, refused: int) -> None:
     """A robot's report of its drive: five tags, and where it is at the end of two and a half rounds."""
-    *_, last = printed.splitlines()
-    numbers = re.fullmatch(r"(-?\d+) mm, (-?\d+) mm, (-?\d+) mrad, (\d+) beacons, (\d+) refused", last)
-    assert numbers is not None, last
-    x_mm, y_mm, mrad, beacons, refused_ones = map(int, numbers.groups())
+    poses = [line for line in printed.splitlines() if not line.startswith("tag ")]
+    numbers = re.fullmatch(
+        r"(-?\d+) mm, (-?\d+) mm, (-?\d+) mrad, (\d+) beacons, (\d+) refused(?: \(last: (.*)\))?", poses[-1]
+    )
+    assert numbers is not None, poses[-1]
+    assert numbers[6] in (None, "not four whole numbers")
+    x_mm, y_mm, mrad, beacons, refused_ones = map(int, numbers.groups()[:5])
     x_m, y_m, heading_rad = drive_end(DRIVE_S)
     # The left wheel slips by one part in a hundred: by odometry alone the heading would be 0.55 rad off.
     assert math.dist((1e-3 * x_mm, 1e-3 * y_mm), (x_m, y_m)) < 0.04
     assert abs(math.remainder(1e-3 * mrad - heading_rad, 2 * math.pi)) < 0.05
     assert (beacons, refused_ones) == (5, refused)
-    assert len(printed.splitlines()) == pytest.approx(25 * DRIVE_S, rel=0.02)
+    assert len(poses) == pytest.approx(25 * DRIVE_S, rel=0.02)
 
 
 def build_stm32(folder: Path, source: Path, library: Path, *flags: str) -> None:
@@ -172,6 +175,57 @@ def test_pins_of_an_esp32_are_free(tmp_path: Path, chip: str) -> None:
         assert not TAKEN[chip] & set(pins)
 
 
+ROBOTS = [(build_arduino, SKETCH), (build_esp_idf, ESP_IDF / "main.c")]
+NOT_FOUR = "not four whole numbers"
+
+
+@pytest.mark.parametrize(("build", "source"), ROBOTS, ids=["arduino", "esp_idf"])
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        ("40 9 100.5 2000", NOT_FOUR),
+        ("40,9,0,2000", NOT_FOUR),
+        ("40 9 0", NOT_FOUR),
+        ("40 9 0 2000 1", NOT_FOUR),
+        ("40 9 0 0", "BSLAM_E_RANGE"),
+        ("740 9 0 2000", "BSLAM_E_TIME"),
+        ("40 9 0 2000 \\r", "none"),
+    ],
+)
+def test_what_is_refused_says_why(
+    tmp_path: Path, library: Path, build: Build, source: Path, said: str, reason: str
+) -> None:
+    build(tmp_path, source, library, f'-DNOISE="{said}\\n"')
+    *_, last = [line for line in run("./robot", folder=tmp_path).stdout.splitlines() if "mrad" in line]
+    assert last.endswith(f"{int(reason != 'none')} refused (last: {reason})")
+
+
+@pytest.mark.parametrize(("build", "source"), ROBOTS, ids=["arduino", "esp_idf"])
+def test_the_first_metre_is_as_its_readme_has_it(
+    tmp_path: Path, library: Path, build: Build, source: Path
+) -> None:
+    readme = (ROOT / "examples" / source.relative_to(EXAMPLES).parts[0] / "README.md").read_text("utf-8")
+    (shown,) = re.findall(r"((?:    .*(?:mrad|tag).*\n)+)    \.\.\.\n((?:    .*\n)+)", readme)
+    build(tmp_path, source, library, "-DDRIVE_METRE")
+    lines = run("./robot", folder=tmp_path).stdout.splitlines()
+    first_tag = next(number for number, line in enumerate(lines) if line.startswith("tag"))
+    last_tag = max(number for number, line in enumerate(lines) if line.startswith("tag"))
+    for block, number in zip(shown, (first_tag, last_tag), strict=True):
+        for wanted, line in zip(block.splitlines(), lines[number - 1 : number + 1], strict=True):
+            assert re.sub(r"-?\d+", "N", line) == re.sub(r"-?\d+", "N", wanted.strip())
+            figures = [[int(one) for one in re.findall(r"-?\d+", text)] for text in (line, wanted)]
+            assert figures[0] == pytest.approx(figures[1], abs=25)
+
+
+@pytest.mark.parametrize("name", ["WHEELBASE_M", "WHEEL_RADIUS_M", "CAMERA_AHEAD_M"])
+def test_a_measure_in_centimetres_does_not_compile(tmp_path: Path, name: str) -> None:
+    text = re.sub(rf"({name} = [\d.]+)f", r"\1e2f", SKETCH.read_text(encoding="utf-8"))
+    (tmp_path / "changed.cpp").write_text(text, encoding="utf-8")
+    includes = (f"-I{STUBS / 'arduino'}", f"-I{FIRMWARE}", "-include", "Arduino.h")
+    said = run("g++", "-std=c++11", *includes, "-c", "changed.cpp", folder=tmp_path, expect=1).stderr
+    assert f"{name}: " in said and "in metres" in said
+
+
 BEGINNERS = [
     (build_stm32, STM32 / "main.c", 2),
     (build_arduino, SKETCH, 2),
@@ -196,7 +250,7 @@ def test_what_does_not_begin_says_why(
     headers = '-DBSLAM_HEADER="bslam/bslam.h"'
     build(tmp_path, source, library, "-DBSLAM_BEACONS_MAX=6", headers)
     said = run("./robot", folder=tmp_path, expect=status).stdout
-    assert set(said.split()) == {"BSLAM_E_SIZE"}  # which names no setting
+    assert "BSLAM_E_SIZE" in said and "gate_d2" not in said
     build(tmp_path, changed, library, headers)
     said = run("./robot", folder=tmp_path, expect=status).stdout
     assert "gate_d2" in said.split()[:2]
@@ -214,6 +268,15 @@ function(target_compile_options)
 endfunction()
 """
 """What ESP-IDF's build has, for `cmake -P`."""
+
+
+def test_the_esp_idf_component_says_that_it_was_copied_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "esp_idf/components/bslam"
+    folder.mkdir(parents=True)
+    cmake = (EXAMPLES / "esp_idf/components/bslam/CMakeLists.txt").read_text(encoding="utf-8")
+    (folder / "CMakeLists.txt").write_text(f"{IDF}{cmake}", encoding="utf-8")
+    said = " ".join(run("cmake", "-P", "CMakeLists.txt", folder=folder, expect=1).stderr.split())
+    assert "has no bslam/bslam.h" in said and "bslam-esp-idf-*.tar.gz (make packages)" in said
 
 
 @pytest.mark.parametrize("component", ["main", "components/bslam"])
