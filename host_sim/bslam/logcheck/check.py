@@ -28,6 +28,7 @@ _BLIND: Final = (
 _HANGING: Final = "all else: it takes sightings that change"
 _STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons are seen"
 _ONE_CURVATURE: Final = "one wheel against the other, scale of the turn: the drive has one curvature"
+_DELAY: Final = "delay of the sightings: the drive hardly changes its speed or its turn"
 _NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
 
 
@@ -66,7 +67,9 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
         return Report(log.name, [*findings, *sign_findings(log, signed, shown, [])], [*untested, _NO_RANGES])
     solution = solve(log, drive, flow)
     findings += sign_findings(log, signed, shown, solution.references)
-    findings += [*verdict.delay(solution, drive, flow), *verdict.scales(solution, drive, flow)]
+    late = [*verdict.delay(solution, drive, flow)]
+    is_held = solution.is_delay_clear or not all(one.is_note for one in late)
+    findings += [*(late if is_held else []), *verdict.scales(solution, drive, flow)]
     findings += [
         *verdict.mount(solution, drive),
         *verdict.noise(solution),
@@ -76,6 +79,9 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
     if solution.has_one_curvature:
         untested.append(_ONE_CURVATURE)
         names = ["way", "yaw", "delay"]
+    if not is_held:
+        untested.append(_DELAY)
+        names.remove("delay")
     return Report(log.name, findings, untested, {name: vars(getattr(solution, name)) for name in names})
 
 

@@ -27,7 +27,7 @@ from bslam.logcheck.batch import (
     standard_errors,
 )
 from bslam.logcheck.drive import Bools, Drive, Floats
-from bslam.logcheck.flow import Flow
+from bslam.logcheck.flow import DELAYS_S, Flow
 from bslam.logcheck.identity import contradictions
 from bslam.logcheck.reference import Fitted, references
 from bslam.logcheck.start import first_state
@@ -39,6 +39,10 @@ _FAR_KNOWN_D2: Final = 9.0  # once odometry's noise is known
 _DOUBT: Final = 1e3  # by what the noise of a doubtful sighting counts as larger
 _BLOCK_S: Final = 5.0
 _COLLINEAR: Final = 0.9
+_AS_GOOD: Final = 1.05  # by which the flow's spread may be larger at a delay that is tried
+_TRIED_MAX: Final = 9
+_CLEAR: Final = 10.0  # by which the best delay costs less than any other
+_FAR_S: Final = 0.15  # from it
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ class Solution:
     delay_gain: float  # log-likelihood by it
     noise: tuple[Noise, Noise]  # bearings, ranges
     references: list[Fitted]
+    is_delay_clear: bool  # no delay far from it fits about as well
     has_one_curvature: bool  # on which turn and bend cannot be told apart
 
 
@@ -91,6 +96,7 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
         # Odometry is known better now than it was told, which tells labels apart that fitted either way.
         sharp = whole.step_sd * np.minimum(1.0, 2.0 * state.scale[[2, 2, 3]])
         problem, state, doubtful = _fitted(replace(whole, step_sd=sharp), state.parameters, _FAR_KNOWN_D2)
+    state, is_clear = _searched(problem, state, flow)
     delay_s = float(state.parameters[DELAY]) - drive.delay_s
     error_s = float(standard_errors(problem, state, _ALL)[DELAY])
     gain = _cost_at(problem, state, drive.delay_s) - _cost_at(problem, state, drive.delay_s + delay_s)
@@ -105,7 +111,28 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
     way, turn, bend, yaw = (Estimate(*one) for one in zip(values, errors, covers, strict=True))
     noise, fitted = _noise(problem, state, ~doubtful), references(log, problem, state)
     has_one_curvature = sameness_of_curvature(problem, state) > _COLLINEAR
-    return Solution(whole, state, way, turn, bend, yaw, delay, gain, noise, fitted, has_one_curvature)
+    return Solution(
+        whole, state, way, turn, bend, yaw, delay, gain, noise, fitted, is_clear, has_one_curvature
+    )
+
+
+def _searched(problem: Problem, state: State, flow: Flow) -> tuple[State, bool]:
+    """The state at the best of all delays that the flow allows, as a fit stays among bumps where it began; and
+    whether it is clearly the best.
+    """
+    row_s, told_s = problem.drive.row_s, problem.drive.delay_s
+    own_s = told_s + row_s * np.rint((state.parameters[DELAY] - told_s) / row_s)
+    stride_s = row_s * max(1.0, np.rint(0.1 / row_s))  # whole rows, as within one its noise is averaged
+    first, last = np.ceil((DELAYS_S[[0, -1]] - told_s) / stride_s)
+    tried_s = told_s + stride_s * np.arange(first, last)
+    tried_s = tried_s[np.interp(tried_s, DELAYS_S, flow.spreads) < _AS_GOOD * flow.spreads.min()]
+    tried_s = np.append(tried_s[:: 1 + len(tried_s) // _TRIED_MAX], own_s)
+    costs = np.array([_cost_at(problem, state, delay_s) for delay_s in tried_s.tolist()])
+    best_s = float(tried_s[np.argmin(costs)])
+    is_clear = bool(np.all(costs[np.abs(tried_s - best_s) > _FAR_S] > costs.min() + _CLEAR))
+    if best_s != own_s:
+        state = fit(problem, _delayed(state, best_s), _ALL, rounds=1)
+    return state, is_clear
 
 
 def _fitted(problem: Problem, parameters: Floats, far_d2: float) -> tuple[Problem, State, Bools]:
