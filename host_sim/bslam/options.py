@@ -10,7 +10,7 @@ import numpy as np
 
 from bslam.core.presets import PRESETS, preset_settings
 from bslam.errors import BslamError, did_you_mean
-from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS, Log, Robot
+from bslam.log import SIGHTING_DELAY_US, WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS, Log, Robot
 from bslam.parsing.settings import SHARE, Rule, integer
 
 OBSERVATIONS = ("distance", "direction")
@@ -203,7 +203,8 @@ def odometry_lead_us(options: RunOptions, log: Log) -> int:
 def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
     """Every setting of the core by its name in C; a later source wins over an earlier one.
 
-    Raises BslamError for a setting of robot.toml that does not exist.
+    Raises BslamError for a setting of robot.toml that does not exist, and for sightings that would wait for
+    odometry: a robot's filter goes on without it, and a log's stamps can be right.
     """
     preset = _preset_params(options, log)
     params = preset | {"motion": MOTIONS.index(options.motion)}
@@ -224,7 +225,12 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
             allowed = f"allowed: {', '.join(preset)}{did_you_mean(name, preset)}"
             raise BslamError(f"{log.name}: robot.toml, [settings], key {name}: no such setting; {allowed}")
         params[name] = value
-    return params | _recovery_params(recovery_of(options)) | dict(options.parameters)
+    params |= _recovery_params(recovery_of(options)) | dict(options.parameters)
+    if params["sighting_delay_us"] < 0:
+        early_us = -int(params["sighting_delay_us"])
+        where = f"{log.name}: add {early_us} to time_us of sightings.csv instead; sighting_delay_us"
+        SIGHTING_DELAY_US.convert(-early_us, where)
+    return params
 
 
 _SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_floor_m", "range_sd_fraction")

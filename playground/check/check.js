@@ -126,6 +126,8 @@ function delayFinding(drive, flow) {
     }
     const told = drive.delayS ? `, besides the ${(1e3 * drive.delayS).toFixed(0)} ms that are told` : "";
     const late = delayS > 0 ? "late" : "early";
+    const wholeUs = Math.round(1e6 * (delayS + drive.delayS));
+    const shift = `add ${Math.round(-1e6 * delayS)} to time_us of sightings.csv`;
     return [
         {
             kind: "delay",
@@ -133,7 +135,7 @@ function delayFinding(drive, flow) {
             sure:
                 "by how bearings and ranges follow odometry, to some 20 ms; " +
                 `odometry's rows are ${(1e3 * drive.rowS).toFixed(0)} ms apart`,
-            mend: `--set sighting_delay_us=${Math.round(1e6 * (delayS + drive.delayS))}`,
+            mend: wholeUs >= 0 ? `--set sighting_delay_us=${wholeUs}` : shift,
         },
     ];
 }

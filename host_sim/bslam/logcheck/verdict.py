@@ -90,13 +90,16 @@ def delay(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     if abs(found.value) < 0.25 * _DELAY_S or gain < _LIKELY:
         return
     told = f", besides the {1e3 * drive.delay_s:.0f} ms that are told" if drive.delay_s else ""
-    late = "late" if found.value > 0.0 else "early"
+    late, whole_us = "late" if found.value > 0.0 else "early", round(1e6 * (found.value + drive.delay_s))
+    shift = (
+        f"add {round(-1e6 * found.value)} to time_us of sightings.csv"  # a filter cannot wait for odometry
+    )
     yield Finding(
         "delay",
         f"sightings come {1e3 * abs(found.value):.0f} ms {late} against odometry{told}",
         f"+- {1e3 * found.error:.0f} ms; log-likelihood {gain:.0f} higher than as told; odometry's rows are "
         f"{1e3 * drive.row_s:.0f} ms apart",
-        f"--set sighting_delay_us={round(1e6 * (found.value + drive.delay_s))}",
+        f"--set sighting_delay_us={whole_us}" if whole_us >= 0 else shift,
         {"delay_s": found.value, "error": found.error, "log_likelihood_gain": gain},
         Picture(
             "delay, s",

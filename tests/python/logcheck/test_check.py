@@ -122,12 +122,24 @@ def test_check_a_delay_is_named_with_the_setting_that_mends_it(delay_s):
     late_us = log.sightings.time_us + round(1e6 * delay_s)
     one = the_one(with_sightings(log, time_us=late_us))
     assert one.kind == "delay"
-    setting, value_us = one.mend.split("=")
-    assert setting == "--set sighting_delay_us"
-    assert int(value_us) == pytest.approx(1e6 * delay_s, abs=15_000)
     if delay_s > 0.0:
+        setting, value_us = one.mend.split("=")
+        assert setting == "--set sighting_delay_us"
         told = with_robot(with_sightings(log, time_us=late_us), sighting_delay_us=int(value_us))
-        assert found(told)[0] == []
+    else:
+        _, value_us, *_, file = one.mend.split()
+        assert file == "sightings.csv" and "time_us" in one.mend
+        told = with_sightings(log, time_us=late_us + int(value_us))
+    assert int(value_us) == pytest.approx(1e6 * abs(delay_s), abs=15_000)
+    assert found(told)[0] == []
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+@pytest.mark.parametrize("delay_s", [0.3, 0.4])
+def test_check_a_delay_on_an_arc_is_named_or_said_not_to_be_tested(seed, delay_s):
+    log = arc(seed)
+    findings, report = found(with_sightings(log, time_us=log.sightings.time_us + round(1e6 * delay_s)))
+    assert ["delay"] == [one.kind for one in findings] or any("delay" in one for one in report.untested)
 
 
 def test_check_a_delay_that_a_drive_hardly_shows_is_as_unsure_as_it_is_wrong():

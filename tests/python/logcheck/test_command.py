@@ -98,6 +98,13 @@ def test_check_a_setting_that_it_does_not_look_at_is_refused(folder, capsys):
     assert "allowed: forward_scale, turn_scale, sighting_delay_us" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", [["check"], ["replay", "csv"]])
+def test_check_and_replay_refuse_sightings_that_wait_for_odometry_as_robot_toml_does(command, folder, capsys):
+    assert main([*command, str(folder), "--set", "sighting_delay_us=-50000"]) == 2
+    said = capsys.readouterr().err
+    assert "add 50000 to time_us of sightings.csv" in said and "allowed: an integer from 0" in said
+
+
 def test_check_several_logs_in_one_go(folder, tmp_path):
     other = tmp_path / "other"
     made_up(1, seconds=40.0).write(other)
