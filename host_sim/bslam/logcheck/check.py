@@ -10,13 +10,13 @@ from typing import Final
 
 from bslam.errors import BslamError
 from bslam.log import Log
-from bslam.logcheck import verdict
+from bslam.logcheck import plausible, verdict
 from bslam.logcheck.drive import Drive, Factors, drive_of
 from bslam.logcheck.files import are_degrees, check_files, degrees_finding
 from bslam.logcheck.finding import Finding, Report
 from bslam.logcheck.flow import Flow, best_flow
 from bslam.logcheck.solution import solve
-from bslam.logcheck.units import sign_findings, signs, unit_slip
+from bslam.logcheck.units import sign_findings, signs, unit_slip, unknown_unit
 
 Settings = Iterable[tuple[str, int | float]]
 """Of the core, as `Robot.settings`: forward_scale, turn_scale, sighting_delay_us."""
@@ -53,7 +53,12 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
     if are_degrees(log.sightings.bearing_rad):
         findings.append(degrees_finding(log.sightings.bearing_rad, "sightings"))
         factors = Factors(bearing=findings[-1].figures["factor"])
+    findings += [*plausible.repeated(log), *plausible.outside_view(log, factors.bearing)]
+    if wild := [*plausible.counted(log), *plausible.summed_up(log, factors)]:
+        return Report(log.name, [*findings, *wild], [plausible.HELD_BACK])
     drive, flow, factors = _in_si(log, factors, findings)
+    if flow is not None and (wild := [*unknown_unit(log, flow)]):
+        return Report(log.name, [*findings, *wild], [plausible.HELD_BACK])
     if flow is None:
         return Report(log.name, findings, [_BLIND])
     if still := [*verdict.hanging(drive)]:
@@ -72,7 +77,8 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
     findings += [*(late if is_held else []), *verdict.scales(solution, drive, flow)]
     findings += [
         *verdict.mount(solution, drive),
-        *verdict.noise(solution),
+        *verdict.noise(solution, drive),
+        *verdict.wheels(solution, drive),
         *verdict.identities(solution, log),
     ]
     names = ["way", "turn", "bend", "yaw", "delay"]

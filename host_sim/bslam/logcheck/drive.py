@@ -20,7 +20,9 @@ _FRAMES_MAX: Final = 4000  # more tell nothing new, and take time
 _SIGHTINGS_MAX: Final = 10_000
 _BEACONS_MAX: Final = 120  # so many, those seen most, make a map
 _SIGHTINGS_MIN: Final = 4  # of a beacon
-_LEAST_SD: Final = (1e-4, 1e-3)  # rad, m: a sensor without noise may be told
+LEAST_SD: Final = (1e-4, 1e-3)  # rad, m: a sensor without noise may be told
+_FIT_SD: Final = (5e-3, 0.01)  # that a fit takes for it at least: it begins as it is told
+_NOISES: Final = ("left_speed_sd_mps", "forward_sd_per_sqrt_m", "turn_sd_per_sqrt_m", "turn_sd_per_sqrt_rad")
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,8 @@ class Seen:
     label: Ints  # (m,) places in `names` of the drive
     bearing_rad: Floats  # (m,) from the robot's axis
     range_m: Floats  # (m,) NaN: none
-    sd: Floats  # (m, 2) of bearing and range, as told
+    sd: Floats  # (m, 2) of bearing and range, for a fit
+    told_sd: Floats  # (m, 2) as told
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ class Drive:
     robot: Robot
     delay_s: float
     scales: tuple[float, float]  # forward_scale and turn_scale, which `odometry` has already
+    is_exact: bool  # odometry is told to have no noise at all
     is_commanded: bool  # odometry says what the robot shall do, and not what its wheels did
 
     @property
@@ -126,11 +130,14 @@ def drive_of(log: Log, factors: Factors) -> Drive:
     names, label = np.unique(s.beacon_id[rows], return_inverse=True)
     range_m = factors.range * s.range_m[rows]
     bearing_rad = wrap_rad(factors.bearing * s.bearing_rad[rows] + log.robot.sensor_yaw_rad)
-    seen = Seen(time_s[rows], label.astype(np.intp), bearing_rad, range_m, _told_sd(log, range_m, rows))
+    told_sd = _told_sd(log, range_m, rows)
+    sd = np.where(told_sd > LEAST_SD, told_sd, _FIT_SD)
+    seen = Seen(time_s[rows], label.astype(np.intp), bearing_rad, range_m, sd, told_sd)
     scales = params["forward_scale"], params["turn_scale"]
     odometry = Odometry(times_s, factors.way * scales[0] * way_m, factors.turn * scales[1] * turn_rad)
     delay_s, is_commanded = 1e-6 * params["sighting_delay_us"], log.odometry.kind == "velocity"
-    return Drive(odometry, seen, names, log.robot, delay_s, scales, is_commanded)
+    is_exact = not any(params[name] for name in _NOISES)
+    return Drive(odometry, seen, names, log.robot, delay_s, scales, is_exact, is_commanded)
 
 
 def _seconds(time_us: NDArray[np.int64]) -> Floats:
@@ -149,4 +156,4 @@ def _told_sd(log: Log, range_m: Floats, rows: Ints) -> Floats:
     for column, own in enumerate((s.bearing_sd_rad, s.range_sd_m)):
         if own is not None:
             told[column] = np.where(own[rows] > 0.0, own[rows], told[column])
-    return np.maximum(np.column_stack(told), _LEAST_SD)
+    return np.maximum(np.column_stack(told), LEAST_SD)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import re
 import shutil
 import zlib
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.logcheck import plausible
 from bslam.logcheck.drive import Floats
 from bslam.logcheck.finding import Curve, Finding, Picture
 from bslam.parsing.settings import load_toml
@@ -24,6 +26,7 @@ _STEMS: Final = ("odometry", "sightings", "truth")
 _GAP_S: Final = 1.0  # without odometry
 _GAP_ROWS: Final = 8
 _TIME_UNITS: Final = {1e3: "milliseconds", 1e6: "seconds", 1e-3: "nanoseconds"}  # by what makes them us
+_ROWS_US: Final = (500.0, 4e6)  # from row to row of any odometry
 _DEGREES_SHARE: Final = 0.1  # of values beyond a full turn
 _SAME_UNIT: Final = 30.0  # an interval that is less than so many times off is of the same unit
 
@@ -87,12 +90,16 @@ def check_files(folder: Path, copy: Path) -> list[Finding]:
         if table is None:
             continue
         is_odometry = path.name.startswith("odometry")
-        if is_odometry:
-            found = _unit_by_interval(table, told) if isinstance(told, int) and told > 0 else []
+        if is_odometry and isinstance(told, int) and told > 0:
+            found = _unit_of_step(table, told, copy / "robot.toml") or _unit_by_interval(table, told)
+        elif is_odometry:
+            found = []
         else:
             found = _unit_by_span(table, span_us) if len(span_us) else []
         found += _stamps(table, is_odometry)
         found += _degrees(table) if "bearing_rad" in table.names else []
+        if {"x_m", "y_m", "theta_rad"} <= set(table.names):
+            found += plausible.headings(*(table.column(name) for name in ("x_m", "y_m", "theta_rad")))
         if is_odometry:
             span_us = table.column("time_us")[[0, -1]]
         if found:
@@ -101,6 +108,19 @@ def check_files(folder: Path, copy: Path) -> list[Finding]:
     if findings:  # a signature a row, which may be gone
         (copy / "signatures.npy").unlink(missing_ok=True)
     return findings
+
+
+def _unit_of_step(table: _Table, step_us: int, robot: Path) -> list[Finding]:
+    """A step that no robot has, while the stamps are as far apart as another unit would make it."""
+    interval = float(np.median(np.diff(np.unique(table.column("time_us")))))
+    fitting = [one for one in _TIME_UNITS if 0.3 < one * step_us / interval < 3.0]
+    if not _ROWS_US[0] <= interval <= _ROWS_US[1] or _ROWS_US[0] <= step_us <= _ROWS_US[1] or not fitting:
+        return []
+    whole_us = round(fitting[0] * step_us)
+    robot.write_text(re.sub(r"(?m)^(\s*step_us\s*=).*$", rf"\1 {whole_us}", robot.read_text()))
+    what = f"robot.toml: step_us is in {_TIME_UNITS[fitting[0]]}"
+    sure = f"step_us = {step_us}, and stamps of odometry are {interval:g} us apart"
+    return [Finding("stamps", what, sure, f"step_us = {whole_us} in robot.toml", {"factor": fitting[0]})]
 
 
 def _unit_by_interval(table: _Table, step_us: int) -> list[Finding]:

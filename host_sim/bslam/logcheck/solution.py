@@ -99,12 +99,13 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
     state, is_clear = _searched(problem, state, flow)
     delay_s = float(state.parameters[DELAY]) - drive.delay_s
     error_s = float(standard_errors(problem, state, _ALL)[DELAY])
-    gain = _cost_at(problem, state, drive.delay_s) - _cost_at(problem, state, drive.delay_s + delay_s)
+    rows = np.rint(delay_s / drive.row_s)  # between rows of odometry its noise is averaged, which a fit likes
+    gain = _cost_at(problem, state, drive.delay_s)
+    gain -= _cost_at(problem, state, drive.delay_s + (rows * drive.row_s if rows else delay_s))
     if gain > 0.0:  # by delay the likelihood is bumpy: its bend at a bump is more than that of the whole
         error_s = max(error_s, abs(delay_s) / math.sqrt(2.0 * gain))
     delay = Estimate(delay_s, error_s)
-    # Between rows of odometry its noise is averaged, which a fit likes: whole rows for all else.
-    rows = np.rint(delay_s / drive.row_s) if abs(delay_s) >= drive.row_s else 0.0
+    rows = rows if abs(delay_s) >= drive.row_s else 0.0
     state = fit(problem, _delayed(state, drive.delay_s + rows * drive.row_s), _TIMED, rounds=1)
     errors, covers = (standard_errors(problem, state, _TIMED, told).tolist() for told in (False, True))
     values = state.parameters[list(_TIMED)].tolist()
@@ -117,8 +118,8 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
 
 
 def _searched(problem: Problem, state: State, flow: Flow) -> tuple[State, bool]:
-    """The state at the best of all delays that the flow allows, as a fit stays among bumps where it began; and
-    whether it is clearly the best.
+    """The state at the best of the delays that the flow allows, as a fit stays among bumps where it began;
+    and whether it is clearly the best.
     """
     row_s, told_s = problem.drive.row_s, problem.drive.delay_s
     own_s = told_s + row_s * np.rint((state.parameters[DELAY] - told_s) / row_s)
@@ -129,6 +130,8 @@ def _searched(problem: Problem, state: State, flow: Flow) -> tuple[State, bool]:
     tried_s = np.append(tried_s[:: 1 + len(tried_s) // _TRIED_MAX], own_s)
     costs = np.array([_cost_at(problem, state, delay_s) for delay_s in tried_s.tolist()])
     best_s = float(tried_s[np.argmin(costs)])
+    if abs(best_s - own_s) < _FAR_S or costs[-1] < costs.min() + _CLEAR:
+        best_s = float(own_s)
     is_clear = bool(np.all(costs[np.abs(tried_s - best_s) > _FAR_S] > costs.min() + _CLEAR))
     if best_s != own_s:
         state = fit(problem, _delayed(state, best_s), _ALL, rounds=1)
@@ -157,6 +160,7 @@ def _cost_at(problem: Problem, state: State, delay_s: float) -> float:
 def _noise(problem: Problem, state: State, kept: Bools) -> tuple[Noise, Noise]:
     seen, free = problem.drive.seen, np.sqrt(scatter(problem, state, _TIMED)[1])
     errors = errors_at(problem, state)[problem.step_sd.size :].reshape(-1, 2)[kept]
+    errors *= (seen.sd / seen.told_sd)[kept]
     slots = np.floor(seen.time_s[kept] / _BLOCK_S) * len(problem.drive.names) + seen.label[kept]
     _, slot, count = np.unique(slots, return_inverse=True, return_counts=True)
     bearing, range_ = (

@@ -32,7 +32,9 @@ def is_gross(factor: float) -> bool:
 
 def unit_slip(log: Log, drive: Drive, flow: Flow) -> tuple[Factors, Finding] | None:
     """The slip of units that explains most of the flow; None if it needs none. Others may show after it."""
-    kind, what, columns, factors = min(_slips(log), key=lambda slip: _misfits(slip[3], flow).sum())
+    kind, what, columns, factors = min(
+        _slips(log, drive.row_s), key=lambda slip: _misfits(slip[3], flow).sum()
+    )
     before, after = _misfits(Factors(), flow), _misfits(factors, flow)
     is_mended = before.sum() - after.sum() > _GROSS and after[before != after].max() < _SAME
     sure = f"sightings show {flow.way:.4g} of odometry's way and {flow.turn:.4g} of its turn"
@@ -46,7 +48,27 @@ def unit_slip(log: Log, drive: Drive, flow: Flow) -> tuple[Factors, Finding] | N
     return factors, Finding(kind, what, sure, f"multiply {columns} by {factor:.6g}", {"factor": factor})
 
 
-def _slips(log: Log) -> Iterator[Slip]:
+def unknown_unit(log: Log, flow: Flow) -> Iterator[Finding]:
+    """Odometry that is as much off in its way as in its turn, by no unit's factor."""
+    way, turn = abs(flow.way), abs(flow.turn)
+    if log.odometry.kind == "velocity" or not (way > 0.0 and turn > 0.0 and is_gross(way) and is_gross(turn)):
+        return
+    ends = sorted((turn, abs(flow.turn_most))) if math.isfinite(flow.turn_most) else [turn, turn]
+    if not math.exp(-_SAME) * ends[0] < way < math.exp(_SAME) * ends[1]:
+        return
+    ticks = log.odometry.kind == "ticks"
+    columns = "left_ticks and right_ticks" if ticks else "left_m and right_m"
+    what = f"odometry: {columns} are about {1.0 / way:.3g} times too large, and in no unit that is known"
+    sure = f"sightings show {flow.way:.3g} of odometry's way and {flow.turn:.3g} of its turn"
+    mend = (
+        "mend ticks_per_revolution, left_radius_m and right_radius_m of robot.toml"
+        if ticks
+        else "write metres; counters as left_ticks, right_ticks, with the four keys of robot.toml"
+    )
+    yield Finding("units", what, sure, mend, {"factor": way})
+
+
+def _slips(log: Log, row_s: float) -> Iterator[Slip]:
     kind = log.odometry.kind
     columns = " and ".join(("left_radius_m", "right_radius_m") if kind == "ticks" else ODOMETRY_COLUMNS[kind])
     for name, unit in UNITS.items():
@@ -57,6 +79,9 @@ def _slips(log: Log) -> Iterator[Slip]:
         yield "units", f"odometry: {columns} are in {name}", columns, Factors(unit, unit)
         both = f"{columns} and range_m"
         yield "units", f"odometry and sightings: {both} are in {name}", both, Factors(unit, unit, 1.0, unit)
+        if kind == "wheels":
+            speeds = "odometry.csv: left_m and right_m are speeds, m/s"
+            yield "units", speeds, columns, Factors(row_s, row_s)
         yield "units", f"robot.toml: wheelbase_m is in {name}", "wheelbase_m", Factors(turn=1.0 / unit)
     if kind == "velocity":
         yield "degrees", "odometry.csv: omega_radps is in degrees", "omega_radps", Factors(turn=_DEGREE)

@@ -15,7 +15,7 @@ import numpy as np
 
 from bslam.log import Log
 from bslam.logcheck.batch import DELAY, relative
-from bslam.logcheck.drive import Drive
+from bslam.logcheck.drive import LEAST_SD, Drive
 from bslam.logcheck.finding import Curve, Finding, Picture
 from bslam.logcheck.flow import DELAYS_S, Flow
 from bslam.logcheck.identity import Exchange, exchanges
@@ -39,6 +39,7 @@ _DELAY_ROWS: Final = 2.0
 _LEAD_S: Final = 0.3  # of commands before the motion
 _SINGLE, _BLOCK = 2.0, 2.5  # noise over what is told
 _CAUTIOUS: Final = 0.33
+_EXACT_MPS: Final = 0.004
 _NAMELESS: Final = 0.05  # share of sightings
 _OUTSIDE: Final = 0.2
 
@@ -91,9 +92,7 @@ def delay(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
         return
     told = f", besides the {1e3 * drive.delay_s:.0f} ms that are told" if drive.delay_s else ""
     late, whole_us = "late" if found.value > 0.0 else "early", round(1e6 * (found.value + drive.delay_s))
-    shift = (
-        f"add {round(-1e6 * found.value)} to time_us of sightings.csv"  # a filter cannot wait for odometry
-    )
+    shift = f"add {round(-1e6 * found.value)} to time_us of sightings.csv"  # a filter waits for nothing
     yield Finding(
         "delay",
         f"sightings come {1e3 * abs(found.value):.0f} ms {late} against odometry{told}",
@@ -221,20 +220,44 @@ def mount(solution: Solution, drive: Drive) -> Iterator[Finding]:
         )
 
 
-def noise(solution: Solution) -> Iterator[Finding]:
+def wheels(solution: Solution, drive: Drive) -> Iterator[Finding]:
+    """Noise of odometry that is told to have none."""
+    if drive.is_commanded or not drive.is_exact:
+        return
+    problem = solution.problem
+    turn_sd = solution.state.scale[3] * problem.step_sd[:, 2]
+    per_speed = math.sqrt(2.0 * drive.row_s) / drive.robot.wheelbase_m
+    sigma_mps = float(np.median(turn_sd / np.sqrt(np.diff(problem.frame_s)))) / per_speed
+    if sigma_mps > _EXACT_MPS:
+        yield Finding(
+            "noise",
+            "odometry is told to have no noise, and errs",
+            f"its turn scatters as by {sigma_mps:.2g} m/s of each wheel",
+            f"wheel_speed_sigma_mps = {sigma_mps:.2g} in robot.toml",
+            {"sigma_mps": sigma_mps},
+        )
+
+
+def noise(solution: Solution, drive: Drive) -> Iterator[Finding]:
     """Of sightings, against what is told."""
     settings = ("bearing_sigma_rad", "range_sigma_fraction and range_sigma_floor_m")
-    for what, one, keys in zip(("bearings", "ranges"), solution.noise, settings, strict=True):
+    told_sd = np.median(drive.seen.told_sd, axis=0).tolist()
+    zeros = zip(("bearing_sigma_rad", "range_sigma_floor_m"), told_sd, LEAST_SD, strict=True)
+    rows = zip(("bearings", "ranges"), solution.noise, settings, zeros, strict=True)
+    for what, one, keys, (key, sd, least) in rows:
         factor = max(one.single, one.block, 1e-3)
         is_small = one.single > _SINGLE or one.block > _BLOCK
         if is_small or factor < _CAUTIOUS:
             times = f"{factor:.1f} times more" if is_small else f"{1.0 / factor:.0f} times less"
+            mend = f"multiply {keys} of robot.toml, or the sd columns of sightings.csv, by {factor:.2g}"
+            if is_small and sd <= least:
+                mend = f"{key} = {factor * sd:.2g} in robot.toml; none is told"
             yield Finding(
                 "noise",
                 f"{what} scatter {times} than is told",
                 f"{one.single:.2f} of the told noise in single sightings, {one.block:.2f} in sums over 5 s; "
                 f"{len(one.errors)} sightings",
-                f"multiply {keys} of robot.toml, or the sd columns of sightings.csv, by {factor:.2g}",
+                mend,
                 {"single": one.single, "block": one.block},
                 _histogram(one),
                 is_note=not is_small,
