@@ -53,7 +53,7 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
     if are_degrees(log.sightings.bearing_rad):
         findings.append(degrees_finding(log.sightings.bearing_rad, "sightings"))
         factors = Factors(bearing=findings[-1].figures["factor"])
-    findings += [*plausible.repeated(log), *plausible.outside_view(log, factors.bearing)]
+    findings += plausible.repeated(log)
     if wild := [*plausible.counted(log), *plausible.summed_up(log, factors)]:
         return Report(log.name, [*findings, *wild], [plausible.HELD_BACK])
     drive, flow, factors = _in_si(log, factors, findings)
@@ -64,6 +64,8 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
     if still := [*verdict.hanging(drive)]:
         return Report(log.name, [*findings, *still], [_HANGING])
     signed, shown = signs(flow), flow
+    if signed.way > 0.0:  # else the sensor looks backward
+        findings += plausible.outside_view(log, factors.bearing)
     untested = [] if abs(flow.turn) > 2.0 * flow.turn_error else [_STRAIGHT]
     if signed != Factors():
         drive = drive_of(log, factors * signed)
