@@ -12,7 +12,7 @@ C_FILES = sorted((ROOT / "firmware").rglob("*.[ch]"))
 
 # The estimator's equations are numbered 1, 2, ..., the camera's C1, C2, ...
 EQUATION = re.compile(r"\\qquad \\mathrm\{\((C?\d+)\)\}")
-EQUATION_NAMED = re.compile(r"\((C?\d+)\)")
+EQUATION_NAMED = re.compile(r"\((C?\d+[a-z]?)\)")
 LINKED_FUNCTION = re.compile(r"\[`(\w+)\(\)`\]\(([^)]+)\)")
 NAMED_FUNCTION = re.compile(r"`(\w+)\(\)`")
 # MATH "Section", "Section" or MATH 24 or MATH (24), in a comment or in the text of a parameter.
@@ -93,7 +93,8 @@ def test_every_row_of_that_table_names_equations_that_exist():
 
 
 def test_every_equation_that_the_text_refers_to_exists():
-    text = re.sub(r"paper(?: equation)? \(\d+\)(?:(?:-| and |, )\(\d+\))*", "", MATH + CAMERA)
+    text = re.sub(r"^(\$\$|```)(?:math)?$.*?^\1$", "", MATH + CAMERA, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"paper(?: equation)? \(\d+\)(?:(?:-| and |, )\(\d+\))*", "", text)
     text = re.sub(r"^\| (?:\(\d+\)) \|", "", text, flags=re.MULTILINE)
     assert set(EQUATION_NAMED.findall(text)) <= {*equations(MATH), *equations(CAMERA)}
 
