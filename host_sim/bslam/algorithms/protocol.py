@@ -99,7 +99,7 @@ class Algorithm(Protocol):
 
     Wrong associations can be counted of a class that has `accounts() -> Sequence[Account] | None` of the last
     image's sightings (None: it refused the image), and `uids() -> Iterable[int]` of the beacons in its map,
-    provisional ones included.
+    tentative ones included.
 
     Of robots with a gyro, a class that has `gyro(time_us, rate_radps, sd_radps)` is told what it says
     (`Gyroscopic`).

@@ -346,7 +346,7 @@ def _map_text(beacons: Sequence[Any]) -> str:
     for one in beacons:
         sd_cm = 100.0 * math.sqrt(max(one.covariance_m2[0][0] + one.covariance_m2[1][1], 0.0))
         name = str(one.label if one.label >= 0 else one.uid)
-        sure = "" if one.confirmed else "provisional"
+        sure = "" if one.confirmed else "tentative"
         rows.append([name, f"{one.x_m:.3f}", f"{one.y_m:.3f}", f"{sd_cm:.1f}", str(one.sightings), sure])
     return table_of(rows)
 

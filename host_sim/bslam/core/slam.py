@@ -343,7 +343,7 @@ class Slam:
         return np.array([[xx, yx, tx], [yx, yy, ty], [tx, ty, tt]])
 
     def beacons(self) -> list[Beacon]:
-        """The map, provisional beacons included, in the order in which they were added."""
+        """The map, tentative beacons included, in the order in which they were added."""
         view = self._ffi.new("bslam_beacon_view_t *")
         found = []
         for index in range(self._lib.bslam_health(self._robot).beacons):

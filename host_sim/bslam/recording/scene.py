@@ -19,7 +19,7 @@ SIGMAS = 2.4477
 _LEAST_SIZE_M = 0.05
 _HEIGHT_M = 0.5
 _CONFIRMED = {"r": 0.1, "g": 0.45, "b": 0.85, "a": 0.7}
-_PROVISIONAL = {"r": 0.6, "g": 0.6, "b": 0.6, "a": 0.5}
+_TENTATIVE = {"r": 0.6, "g": 0.6, "b": 0.6, "a": 0.5}
 _WHITE = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 _NOTHING: dict[str, list[Any]] = {
     name: [] for name in ("metadata", "arrows", "cubes", "spheres", "lines", "triangles", "models")
@@ -49,7 +49,7 @@ def _entity(log_ns: int, beacon: Beacon) -> Json:
         "size": {"x": width_m[0], "y": width_m[1], "z": _HEIGHT_M},
         "bottom_scale": 1.0,
         "top_scale": 1.0,
-        "color": _CONFIRMED if beacon.confirmed else _PROVISIONAL,
+        "color": _CONFIRMED if beacon.confirmed else _TENTATIVE,
     }
     text = {
         "pose": _pose(beacon.x_m, beacon.y_m, 1.3 * _HEIGHT_M, 0.0),

@@ -32,7 +32,7 @@ _LEVELS: Final = 5  # of each colour in a GIF's palette
 _SIGMAS: Final = 2.0
 _RAY_M: Final = 3.0  # of a sighting without a distance
 _NOSE_M: Final = 0.45
-_PROVISIONAL: Final = (SECOND, 0.4)  # a beacon that the filter has yet to confirm
+_TENTATIVE: Final = (SECOND, 0.4)  # a beacon that the filter has yet to confirm
 _SHOWN: Final = {"matched": "fused", "wrong": "wrong", "new": "new beacon", "rejected": "rejected"}
 
 
@@ -61,7 +61,7 @@ class _Scene:
         self._path = axes.plot([], [], color=ESTIMATE, linewidth=1.1, label="estimate")[0]
         self._rays = axes.add_collection(LineCollection([], zorder=2))
         self._map = axes.plot([], [], "+", color=SECOND, markersize=7, zorder=4, label="map, 2 sigma")[0]
-        axes.plot([], [], "o", color=_PROVISIONAL, fillstyle="none", markersize=8, label="provisional")
+        axes.plot([], [], "o", color=_TENTATIVE, fillstyle="none", markersize=8, label="tentative")
         self._ellipses: Any = None
         style: dict[str, Any] = {"linewidth": 2.5, "marker": "o", "markevery": [0], "markersize": 7}
         self._robots = [axes.plot([], [], color=one, zorder=5, **style)[0] for one in (TRUTH, ESTIMATE)]
@@ -117,7 +117,7 @@ class _Scene:
             offsets=[place for place, _ in places],
             offset_transform=self._room.transData,
             facecolors="none",
-            edgecolors=[*[SECOND if one.confirmed else _PROVISIONAL for one in moment.beacons], ESTIMATE],
+            edgecolors=[*[SECOND if one.confirmed else _TENTATIVE for one in moment.beacons], ESTIMATE],
             linewidths=1.3,
             zorder=4,
         )

@@ -65,14 +65,15 @@ def draw_room_in(axes: Any, room: Room) -> None:
         axes.plot([x1, x2], [y1, y2], color=WALL, linewidth=3, solid_capstyle="round", zorder=2)
     if room.truth_m is not None:
         _draw_truth(axes, room.truth_m)
-    shown = thinned(room.estimate_m)
-    axes.plot(*shown.T, color=ESTIMATE, linewidth=1.1, alpha=0.9, label="estimated path", zorder=4)
+    path_m = thinned(room.estimate_m)
+    axes.plot(*path_m.T, color=ESTIMATE, linewidth=1.1, alpha=0.9, label="estimated path", zorder=4)
     start: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
     axes.plot(*room.estimate_m[0], color=ESTIMATE, label="start", zorder=7, **start)
     if room.beacons is not None:
         _draw_beacons(axes, room.beacons, room.identity)
     for confirmed in (True, False):
-        _draw_mapped(axes, [one for one in room.mapped if one.confirmed == confirmed], confirmed)
+        shown = [one for one in room.mapped if one.confirmed == confirmed and _stands_in(one, low_m, high_m)]
+        _draw_mapped(axes, shown, confirmed)
     axes.set_aspect("equal")
     axes.set_xlim(low_m[0], high_m[0])
     axes.set_ylim(low_m[1], high_m[1])
@@ -110,10 +111,10 @@ def _write(axes: Any, name: str, x_m: float, y_m: float, colour: str) -> None:
 
 
 def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:
-    """Crosses with their ellipse; provisional beacons pale."""
+    """Crosses with their ellipse; tentative beacons pale."""
     if not beacons:
         return
-    label = "mapped beacon" if confirmed else "provisional beacon"
+    label = "mapped beacon" if confirmed else "tentative beacon"
     if any(one.covariance_m2 is not None for one in beacons):
         label += f", {_SIGMAS:g} sigma"
     alpha = 0.95 if confirmed else 0.3
@@ -176,4 +177,11 @@ def _what_is_cut(room: Room, low_m: NDArray[np.float64], high_m: NDArray[np.floa
     """What the title says where the picture is not large enough for the map."""
     lowest_m, highest_m = _reaches(room)
     cut = int(((lowest_m < low_m) | (highest_m > high_m)).any(axis=1).sum())
-    return f"; {cut} of {len(lowest_m)} mapped beacons reach beyond the picture" if cut else ""
+    words = f"; {cut} of {len(lowest_m)} mapped beacons reach beyond the picture" if cut else ""
+    beyond = sum(not one.confirmed and not _stands_in(one, low_m, high_m) for one in room.mapped)
+    return f"{words}; {beyond} tentative beyond the picture" if beyond else words
+
+
+def _stands_in(one: Mapped, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> bool:
+    """Whether the picture has its place: an ellipse without would be a stray stroke at the edge."""
+    return bool(low_m[0] <= one.x_m <= high_m[0] and low_m[1] <= one.y_m <= high_m[1])

@@ -50,7 +50,7 @@ def test_film_shows_the_run_step_by_step_and_has_the_same_bits_again(short: Path
             counts.append(count(film, ImageColor.getrgb(RESULT_COLOURS["matched"])))
             assert all(shows(film, RESULT_COLOURS[one]) for one in ("matched", "wrong", "new"))
         assert counts[1] > 2 * counts[0]
-        # Provisional beacons are in the legend when none is in the room any more.
+        # Tentative beacons are in the legend when none is in the room any more.
         pale = 255 - 0.4 * (255 - np.array(ImageColor.getrgb(SECOND)))
         assert count(film, pale) > 25
 

@@ -47,7 +47,7 @@ def test_room_with_everything_shows_it(made):
     pixels(figure)
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     lines = ["true path", "estimated path", "start"]
-    assert names == [*lines, "true beacon", "mapped beacon, 2 sigma", "provisional beacon, 2 sigma"]
+    assert names == [*lines, "true beacon", "mapped beacon, 2 sigma", "tentative beacon, 2 sigma"]
     low, high = figure.axes[0].get_ylim()
     assert low < -3.0 < 2.0 < high
 
@@ -83,6 +83,15 @@ def test_room_holds_what_is_mapped_unless_that_is_far_too_unsure(made, true):
     axes = draw_room(Room("a room", PATH, PATH if true else None, beacons, [off, unsure])).axes[0]
     assert axes.get_xlim()[1] < 20.0
     assert axes.get_title() == "a room; 1 of 2 mapped beacons reach beyond the picture"
+
+
+def test_room_has_no_ellipse_of_a_beacon_that_stands_beyond_and_counts_these(made):
+    wide_m2 = np.diag([1.0, 100.0])
+    mapped = [Mapped(*place, wide_m2, confirmed) for *place, confirmed in ((1e3, 0, True), (2, -30, False))]
+    axes = draw_room(Room("a room", PATH, PATH, made.beacons, mapped)).axes[0]
+    assert len(axes.patches) == 0
+    words = "a room; 1 of 1 mapped beacons reach beyond the picture; 1 tentative beyond the picture"
+    assert axes.get_title() == words
 
 
 def test_comparison_has_plain_numbers_at_its_scale():
