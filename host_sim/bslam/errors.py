@@ -22,9 +22,19 @@ def did_you_mean(word: object, allowed: Iterable[str]) -> str:
 
 def nearest(word: object, allowed: Iterable[str]) -> str | None:
     """The allowed name that is most like `word`; None where none is near."""
+    found = _nearest_few(word, allowed, 1)
+    return found[0] if found else None
+
+
+def setting_instead(word: object, settings: Iterable[str]) -> str:
+    """What is allowed in place of a setting that does not exist: the nearest ones, and who lists all."""
+    near = _nearest_few(word, settings, 3)
+    return f"allowed: {', '.join(near)}{' or another' if near else 'one'} that `bslam params --all` lists"
+
+
+def _nearest_few(word: object, allowed: Iterable[str], most: int) -> list[str]:
     by_plain_name = {_plain(name): name for name in allowed}
-    found = get_close_matches(_plain(word), by_plain_name, n=1)
-    return by_plain_name[found[0]] if found else None
+    return [by_plain_name[one] for one in get_close_matches(_plain(word), by_plain_name, n=most)]
 
 
 def _plain(name: object) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bslam.core.presets import PRESETS, preset_settings
-from bslam.errors import BslamError, did_you_mean
+from bslam.errors import BslamError, did_you_mean, setting_instead
 from bslam.log import SIGHTING_DELAY_US, WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS, Log, Robot
 from bslam.parsing.settings import SHARE, Rule, integer
 
@@ -222,7 +222,7 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
     for name, value in log.robot.settings:
         if name not in preset:
-            allowed = f"allowed: {', '.join(preset)}{did_you_mean(name, preset)}"
+            allowed = setting_instead(name, preset)
             raise BslamError(f"{log.name}: robot.toml, [settings], key {name}: no such setting; {allowed}")
         params[name] = value
     params |= _recovery_params(recovery_of(options)) | dict(options.parameters)

@@ -6,6 +6,7 @@ import argparse
 import math
 import tomllib
 from collections.abc import Callable, Container, Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,8 +15,8 @@ import joblib
 from bslam.commands.helping import more_options
 from bslam.core.presets import PRESETS
 from bslam.core.slam import Slam
-from bslam.errors import BslamError, did_you_mean
-from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
+from bslam.errors import BslamError, did_you_mean, setting_instead
+from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS, Robot
 from bslam.maps.blob import SUFFIX
 from bslam.options import (
     ALIGNMENTS,
@@ -83,7 +84,7 @@ def add_filter_options(
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="any setting (see `bslam params`); wins over all else; may be repeated",
+        help="any setting (see `bslam params --all`); wins over all else; may be repeated",
     )
     _add_more_options(more_options(parser))
 
@@ -329,8 +330,9 @@ def _checked(values: dict[str, Number], where: str) -> dict[str, Number]:
     table = {one.name: one for one in Slam.parameters()}
     for key, value in values.items():
         if key not in table:
-            allowed = f"allowed: {', '.join(table)}{did_you_mean(key, table)}"
-            raise BslamError(f"{where}: parameter '{key}' does not exist; {allowed}")
+            if key in (one.name for one in fields(Robot)):
+                raise BslamError(f"{where}: {key} is a key of robot.toml; {setting_instead(key, table)}")
+            raise BslamError(f"{where}: parameter '{key}' does not exist; {setting_instead(key, table)}")
         one = table[key]
         if not one.low <= value <= one.high or (one.is_integer and value != int(value)):
             kind = "a whole number" if one.is_integer else "a number"

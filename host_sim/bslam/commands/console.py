@@ -158,7 +158,7 @@ def _change(slam: RemoteSlam, arguments: argparse.Namespace) -> None:
     for text in arguments.set:
         key, equals, value = text.partition("=")
         if not equals or key not in slam.params:
-            raise BslamError(f"--set {text}: allowed: KEY=VALUE with a KEY of `bslam params`")
+            raise BslamError(f"--set {text}: allowed: KEY=VALUE with a KEY of `bslam params --all`")
         try:
             slam.set_param(key, float(value))
         except ValueError:

@@ -21,7 +21,7 @@ _TITLES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("--all", action="store_true", help="internal ones, too")
+    parser.add_argument("--all", action="store_true", help="those that are internal and not stable, too")
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -38,4 +38,7 @@ def execute(arguments: argparse.Namespace) -> int:
             if one.group == group:
                 print(f"{line.ljust(width)}  {one.meaning}")
         print()
+    if not arguments.all:
+        hidden = sum(one.group == "tuning" for one in found)
+        print(f"`bslam params --all` lists {hidden} internal ones, too, of association by appearance")
     return 0

@@ -11,7 +11,7 @@ from bslam.core.appearance import SIGNATURE_SIZE, encode
 from bslam.core.builds import sightings_max
 from bslam.core.inputs import INT32, checked_rows, frame_rows, number, refused_field, whole
 from bslam.core.raw import Flash, library
-from bslam.errors import BslamError, did_you_mean
+from bslam.errors import BslamError, did_you_mean, setting_instead
 
 BY_APPEARANCE = (3, 6, 7, 8)
 """Values of the setting `association` by which classifiers learn."""
@@ -134,10 +134,7 @@ class Slam:
             raise BslamError(f"settings {params!r}: allowed is a mapping, names to numbers")
         for name, value in params.items():
             if name not in self._table:
-                near = did_you_mean(str(name), self._table)
-                raise BslamError(
-                    f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}{near}"
-                )
+                raise BslamError(f"parameter {name!r} does not exist; {setting_instead(name, self._table)}")
             parameter = self._table[name]
             kind = "a whole number" if parameter.is_integer else "a number"
             allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"

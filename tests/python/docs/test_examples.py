@@ -69,6 +69,7 @@ def test_options_of_a_run_are_all_listed(capsys):
         "--help-all",
         "--record",
         "--film",
+        "--all",  # of `bslam params`
     }
     assert set(re.findall(r"(--[a-z-]+)", " ".join(column(section(CLI, "Options of a run"))))) == known
 

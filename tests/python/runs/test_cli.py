@@ -350,8 +350,21 @@ def test_params_lists_every_parameter_with_default_and_meaning(capsys):
     assert any(line.startswith("bearing_sd_rad") and "noise of the direction" in line for line in lines)
     names = [one.name for one in Slam.parameters() if one.group != "tuning"]
     assert [line.split()[0] for line in lines if " to " in line[:70]] == names
+    assert lines[-1].startswith("`bslam params --all` lists ")
     assert main(["params", "--all"]) == 0
     assert "doubt_nats" in capsys.readouterr().out
+
+
+def test_set_names_the_nearest_settings_and_keys_of_the_robots_file(capsys):
+    instead = {
+        "range_sd": "parameter 'range_sd' does not exist; allowed: range_",
+        "sighting_scale_sd": "sighting_scale_sd is a key of robot.toml; allowed: ",
+    }
+    for name, message in instead.items():
+        assert main(["run", "figure3", "--set", f"{name}=1"]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert message in line
+        assert len(line) < 200
 
 
 def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):

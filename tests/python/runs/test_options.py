@@ -216,7 +216,7 @@ def test_settings_of_the_log_win_over_presets_and_lose_against_the_user(made):
     assert core_params(RunOptions(parameters=(("gate_d2", 9.0),)), told)["gate_d2"] == 9.0
     wrong = replace(log, robot=replace(log.robot, settings=(("gate", 0),)))
     with pytest.raises(
-        BslamError, match=r"robot\.toml, \[settings\], key gate: no such setting; allowed: whe"
+        BslamError, match=r"robot\.toml, \[settings\], key gate: no such setting; allowed: gate_d2 or"
     ):
         core_params(RunOptions(), wrong)
 
