@@ -1,5 +1,7 @@
-"""The one exception a user sees, and the nearest name for a misspelt one."""
+"""The one exception a user sees, the nearest name for a misspelt one, and what brings a missing package."""
 
+import shlex
+import sys
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -18,6 +20,11 @@ def did_you_mean(word: object, allowed: Iterable[str]) -> str:
     """
     name = nearest(word, allowed)
     return "" if name is None else f"; did you mean {name!r}?"
+
+
+def pip_install(*packages: str) -> str:
+    """The command that brings packages to the Python that runs, which need not be the one on PATH."""
+    return shlex.join([sys.executable, "-m", "pip", "install", *packages])
 
 
 def nearest(word: object, allowed: Iterable[str]) -> str | None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bslam.calibration.calibrate import Estimate
 from bslam.datasets.pictures import SUFFIXES
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.rig import Camera, Lens
 
 try:
@@ -232,7 +232,8 @@ def as_toml(
 
 def _opencv() -> Any:
     if cv2 is None:
-        raise BslamError("calibrate camera: OpenCV is missing; allowed: pip install opencv-python-headless")
+        allowed = pip_install("opencv-python-headless")
+        raise BslamError(f"calibrate camera: OpenCV is missing; allowed: {allowed}")
     return cv2
 
 

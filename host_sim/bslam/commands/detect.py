@@ -21,6 +21,7 @@ from bslam.datasets.pictures import SUFFIXES, load_picture
 from bslam.detect.boxes import curve, overlaps
 from bslam.detect.examples import Example, read_collection
 from bslam.detect.imports import import_labels
+from bslam.detect.linear import linear_svc
 from bslam.detect.page import Figures, page
 from bslam.detect.train import HIT, Trained, alone, find, train
 from bslam.errors import BslamError
@@ -105,6 +106,7 @@ def _train(arguments: argparse.Namespace) -> int:
     if out.suffix != ".json":
         raise BslamError(f"--out {out}: allowed: a file to be written, MODEL.json")
     check_name(out.stem)
+    linear_svc()  # is said before the pictures are read
     wanted = [one for one in (arguments.classes or "").split(",") if one]
     collection = read_collection([Path(one) for one in arguments.sources], wanted)
     print(f"{len(collection.examples)} pictures, classes: {', '.join(collection.kinds)}", flush=True)

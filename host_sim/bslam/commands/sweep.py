@@ -23,7 +23,7 @@ from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
 from bslam.commands.helping import more_options
 from bslam.commands.report import HEADINGS, mean_row, table_of, verdict
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.evaluation.consistency import half_interval_95, share_interval_95
 from bslam.evaluation.failure import is_exact
 from bslam.options import RunOptions
@@ -156,7 +156,7 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
             write_parquet(out / PARQUET, result.entries)
             files.insert(0, PARQUET)
         except ImportError as error:
-            print(f"no {PARQUET}: {error}; pip install pyarrow, and the same command writes it")
+            print(f"no {PARQUET}: {error}; {pip_install('pyarrow')}, and the same command writes it")
     if result.kept:
         print(f"{result.kept} of {len(result.entries)} runs were there already")
     print(f"files in {out}: {', '.join(files)}")

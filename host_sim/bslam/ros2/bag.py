@@ -11,11 +11,11 @@ from typing import Any, Final
 
 from tqdm import tqdm
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.ros2.definitions import DEFINITIONS
 
 TF_STATIC: Final = "/tf_static"
-INSTALL: Final = "pip install rosbags"
+INSTALL: Final = pip_install("rosbags")
 _IDL_SEPARATOR: Final = "=" * 80 + "\n"
 _TOPICS_MAX: Final = 30
 """So many are named in an error."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.runs.sweep import code_digest
 
 _PATIENCE_S = 10
@@ -20,7 +20,8 @@ def cluster(address: str) -> Iterator[str]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise BslamError(f"--cluster: {error}; allowed: pip install dask distributed") from error
+        allowed = pip_install("dask", "distributed")
+        raise BslamError(f"--cluster: {error}; allowed: {allowed}") from error
     try:
         client = Client(address, timeout=_PATIENCE_S, set_as_default=True)
     except (OSError, ValueError, TypeError) as error:

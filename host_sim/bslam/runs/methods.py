@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bslam.algorithms import Algorithm, Setup
-from bslam.errors import BslamError, did_you_mean
+from bslam.errors import BslamError, did_you_mean, pip_install
 
 OURS: Final = "bslam"
 BOUND: Final = "map"
@@ -65,7 +65,7 @@ def shipped_methods(map_every: int) -> list[Method]:
             f"{folder}.isam2:Isam2",
             "GTSAM's incremental smoother",
             needs=("gtsam",),
-            install="pip install gtsam",
+            install=pip_install("gtsam"),
             shipped=True,
         ),
         Method(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from bslam.datasets.pictures import SUFFIXES, camera_for, load_picture, scale_picture
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.rig import Camera, Rig
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import true_drive
@@ -107,7 +107,7 @@ def video(path: Path, rig: Rig | None, frames: int, every_s: float) -> Source:
     """
     if cv2 is None:
         raise BslamError(
-            f"{path}: a video needs OpenCV; allowed: pip install opencv-python-headless, or pictures"
+            f"{path}: a video needs OpenCV; allowed: {pip_install('opencv-python-headless')}, or pictures"
         )
     reader = cv2.VideoCapture(str(path))
     good, first = reader.read()

@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.errors import BslamError
+from bslam.errors import BslamError, pip_install
 from bslam.moment import FAILED, FINISHED, Moment, Spot, Stage, Told
 
-INSTALL: Final = "pip install rerun-sdk"
+INSTALL: Final = pip_install("rerun-sdk")
 FILE_SUFFIX: Final = ".rrd"
 _POLL_S: Final = 0.03
 _FLUSH_S: Final = 30.0  # at most for what a viewer, or a disk, has yet to take

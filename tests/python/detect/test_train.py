@@ -1,6 +1,7 @@
 """bslam detect: trained on some pictures it finds the same kind in others; what was trained runs."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,13 @@ def trained(tmp_path_factory):
     write_folder(folder / "learn", 16, 1, empty=4)
     assert main(["detect", "train", str(folder / "learn"), "--out", str(folder / "panels.json")]) == 0
     return folder
+
+
+def test_without_scikit_learn_it_is_said_first_how_to_get_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "sklearn.svm", None)
+    assert main(["detect", "train", "no_folder", "--out", "panels.json"]) == 2
+    said = f"training needs scikit-learn; allowed: {sys.executable} -m pip install scikit-learn\n"
+    assert capsys.readouterr().err.endswith(said)
 
 
 def test_it_finds_the_same_kind_in_other_pictures(trained, capsys):

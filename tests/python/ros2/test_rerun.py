@@ -95,7 +95,8 @@ def test_a_run_is_followed_to_its_end(tmp_path: Path, rerun: type[Stream]) -> No
 
 
 @pytest.mark.parametrize(
-    ("target", "said"), [("x.txt", "FILE.rrd"), ("x.rrd", "which is missing: pip install rerun-sdk")]
+    ("target", "said"),
+    [("x.txt", "FILE.rrd"), ("x.rrd", "which is missing: {python} -m pip install rerun-sdk")],
 )
 def test_what_cannot_be_followed_is_one_line(
     target: str, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -103,7 +104,7 @@ def test_what_cannot_be_followed_is_one_line(
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["live", "paper_room", "--rerun", target]) == 2
     told = capsys.readouterr().err
-    assert said in told and told.count("\n") == 1
+    assert said.format(python=sys.executable) in told and told.count("\n") == 1
 
 
 def test_without_a_screen_a_file_is_offered(

@@ -158,5 +158,5 @@ def test_find_mounting_of_another_size_or_without_board_is_refused(calibrated):
 def test_without_opencv_it_says_how_to_get_it(tmp_path, monkeypatch):
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((240, 320), np.uint8))
     monkeypatch.setattr(calibrate_camera, "cv2", None)
-    with pytest.raises(BslamError, match=r"OpenCV is missing; allowed: pip install opencv"):
+    with pytest.raises(BslamError, match=r"OpenCV is missing; allowed: .* -m pip install opencv"):
         find_boards(tmp_path, BOARD)

@@ -54,7 +54,8 @@ def lines_of(folder):
 
 def test_with_names_classes_of_ones_own_and_none_that_comes_with_bslam(scene, capsys, monkeypatch):
     monkeypatch.setattr(Method, "is_here", property(lambda one: one.name != "isam2"))
-    for name, why in (("isam2", "is not installed; allowed: pip install gtsam"), ("map", "comes with bslam")):
+    install = f"is not installed; allowed: {sys.executable} -m pip install gtsam"
+    for name, why in (("isam2", install), ("map", "comes with bslam")):
         assert main(["compare", "drive", "--out", "out", "--with", name]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert f"--with {name}: {why}" in line
