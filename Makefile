@@ -68,6 +68,10 @@ OWN_THINGS := firmware/models/own_room.json
 
 .PHONY: run
 run: setup-run ## the main job: the paper's room, by sightings and by images, then a real log if at hand
+ifeq ($(wildcard $(RUN_DATA)/mrclam/$(RUN_LOG)),)
+	@echo "make run: no real log will be replayed: get the UTIAS Multi-Robot Cooperative Localization and" \
+	    "Mapping data set from its authors and let BSLAM_DATA name the directory that holds mrclam/$(RUN_LOG)"
+endif
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
 	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --out out/run_camera
 	@echo "make run: now five things of the room, by a detector that learned them from drawn pictures: it may" \
@@ -77,9 +81,6 @@ run: setup-run ## the main job: the paper's room, by sightings and by images, th
 	    --out out/run_own_things
 ifneq ($(wildcard $(RUN_DATA)/mrclam/$(RUN_LOG)),)
 	$(BSLAM) replay mrclam $(RUN_LOG) --robot 3 --out out/replay
-else
-	@echo "make run: no real log replayed: get the UTIAS Multi-Robot Cooperative Localization and Mapping data" \
-	    "set from its authors and let BSLAM_DATA name the directory that holds mrclam/$(RUN_LOG)"
 endif
 
 .PHONY: tables

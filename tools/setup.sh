@@ -113,7 +113,7 @@ install_missing() {
     [[ ${#root[@]} -eq 0 ]] || sudo -n true 2>/dev/null ||
         fail "missing: $why (not root, and sudo would ask)" "install with: $command"
 
-    echo "setup: installing with apt-get: $why"
+    echo "setup: installing with apt-get, which may take minutes: $why"
     export DEBIAN_FRONTEND=noninteractive
     # A failed update is no reason to stop: the lists at hand may do, and the check below has the last word.
     local log
@@ -152,13 +152,14 @@ make_venv() {
 }
 
 install_run_packages() {
-    echo "setup: installing requirements.txt into $venv, and building the extensions"
+    echo "setup: installing requirements.txt into $venv, which may take minutes"
     pip_install --require-hashes -r requirements.lock.txt
+    echo "setup: building the extensions, a minute or two"
     pip_install --no-deps --no-build-isolation --editable .
 }
 
 install_test_packages() {
-    echo "setup: installing requirements-test.txt into $venv"
+    echo "setup: installing requirements-test.txt into $venv, which may take minutes"
     pip_install --require-hashes -r requirements-test.lock.txt
 }
 

@@ -96,7 +96,8 @@ def test_setup_apt_get_that_fails_is_reported_with_its_output(machine: Path) -> 
     result = setup(machine, "run")
     assert result.returncode == 2
     assert result.stdout.splitlines() == [
-        "setup: installing with apt-get: gcc for the C compiler, libc6-dev for the C headers"
+        "setup: installing with apt-get, which may take minutes: gcc for the C compiler, libc6-dev for the C"
+        " headers"
     ]
     assert result.stderr.startswith("setup: apt-get could not install: gcc libc6-dev")
     assert "noninteractive: apt-get -qq update" in result.stderr
