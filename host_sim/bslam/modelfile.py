@@ -117,6 +117,8 @@ class BeaconClass:
 
 
 def load_document(path: Path) -> Mapping[str, Any]:
+    if not path.exists():
+        raise BslamError(f"{path}: there is no such file; allowed: a model that bslam detect train wrote")
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:

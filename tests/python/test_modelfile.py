@@ -112,7 +112,7 @@ def test_document_bad_value_is_refused(file: Path, change: Callable[[Any], None]
 
 
 def test_load_document_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BslamError, match=r"none\.json: cannot be read"):
+    with pytest.raises(BslamError, match=r"none\.json: there is no such file"):
         load_document(tmp_path / "none.json")
 
 

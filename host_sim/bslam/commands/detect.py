@@ -57,7 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("action", choices=_ACTIONS, help="what to do")
     parser.add_argument(
-        "sources", nargs="+", metavar="SOURCE", help="folders, a video or a scenario; see above"
+        "sources",
+        nargs="+",
+        metavar="SOURCE",
+        help="folders; a video or scenario; see the examples",
     )
     parser.add_argument("--model", type=Path, metavar="FILE", help="run, test: the .json that train wrote")
     parser.add_argument(

@@ -67,6 +67,11 @@ def read_folder(path: Path) -> Folder:
     Raises BslamError that names file, line, column, value and what is allowed.
     """
     file = path / FILE
+    if not path.is_dir():
+        raise BslamError(f"{path}: there is no such folder; allowed: one with pictures and {FILE}")
+    if not file.exists():
+        allowed = f"one of {', '.join(COLUMNS)}, as tools/label.html or bslam detect import writes it"
+        raise BslamError(f"{path}: there is no {FILE} in it; allowed: {allowed}")
     rows = _read_rows(file)
     sizes: dict[str, tuple[int, int]] = {}
     labels: dict[str, list[Label]] = {}

@@ -104,7 +104,8 @@ def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iter
     for (part, kind, chosen), its in zip(jobs, done, strict=True):
         windows.setdefault(part, []).extend(its)
         what = "all pictures" if part is None else f"without part {part + 1} of {FOLDS}"
-        yield f"{names[kind]}: trained on {len(chosen)} pictures, {what}: {len(its)} windows"
+        shapes = f"{len(its)} shape{'s' * (len(its) > 1)} of window"
+        yield f"{names[kind]}: trained on {len(chosen)} pictures, {what}: {shapes}"
     count = max(len(its) for its in windows.values())
     if count > WINDOWS_MAX:
         raise BslamError(

@@ -120,8 +120,10 @@ def test_read_folder_takes_no_picture_from_elsewhere(folder: Path) -> None:
 
 
 def test_read_folder_without_labels_file_is_refused(folder: Path) -> None:
-    with pytest.raises(BslamError, match=r"labels\.csv: cannot be read"):
+    with pytest.raises(BslamError, match=r"there is no labels\.csv in it; allowed: one of picture,"):
         read_folder(folder)
+    with pytest.raises(BslamError, match=r"none: there is no such folder; allowed: one with pictures"):
+        read_folder(folder / "none")
 
 
 def test_read_folder_truncated_picture_is_refused_by_its_header(folder: Path) -> None:
