@@ -66,7 +66,7 @@ COMMANDS: dict[str, ModuleType] = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0] in ("-h", "--help", "help"):
+    if not words or words[0] in ("-h", "--help", "--help-all", "help"):
         print(_overview())
         return 0 if words else 2
     if words[0] == "--version":
@@ -75,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name, *rest = words
     try:
         if name not in COMMANDS:
-            allowed = f"allowed: {', '.join(COMMANDS)}{did_you_mean(name, COMMANDS)}"
+            near = did_you_mean(name, COMMANDS) or _with_an_action(name)
+            allowed = f"allowed: {', '.join(COMMANDS)}{near}"
             raise BslamError(f"command '{name}' does not exist; {allowed}")
         command = COMMANDS[name]
         # Not argparse's own sub-parsers: with them options could not stand between two directories.
@@ -106,6 +107,15 @@ def _parser(name: str, command: ModuleType) -> Parser:
     return parser
 
 
+def _with_an_action(word: str) -> str:
+    """What to append where a word is no command, but says what one does; "" where it does not."""
+    for name, command in COMMANDS.items():
+        for one in _parser(name, command)._actions:
+            if not one.option_strings and word in (one.choices or ()):
+                return f"; did you mean `bslam {name} {word}`?"
+    return ""
+
+
 def _overview() -> str:
     lines = [
         "usage: bslam COMMAND [options]",
@@ -121,6 +131,6 @@ def _overview() -> str:
         "examples:",
         "  bslam run paper_room",
         "  bslam tables --seeds 0:10",
-        "  bslam COMMAND --help",
+        "  bslam COMMAND --help, and --help-all with every option",
     ]
     return "\n".join(lines)

@@ -413,6 +413,14 @@ def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, c
     assert f"files in {out}: summary.json\n" in capsys.readouterr().out
 
 
+def test_what_a_command_does_is_no_command_but_named(capsys):
+    for word, command in {"train": "detect train", "new": "scenario new"}.items():
+        assert main([word, "x"]) == 2
+        assert capsys.readouterr().err.endswith(f"; did you mean `bslam {command}`?\n")
+    assert main(["--help-all"]) == 0
+    assert "--help-all with every option" in capsys.readouterr().out
+
+
 def test_a_reader_that_goes_away_leaves_no_traceback():
     words = [sys.executable, "-m", "bslam", "params"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
