@@ -8,7 +8,7 @@ import itertools
 import json
 import statistics
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final, NoReturn
@@ -24,7 +24,7 @@ from bslam.commands.grid import grid
 from bslam.commands.helping import more_options
 from bslam.commands.report import HEADINGS, mean_row, table_of, verdict
 from bslam.errors import BslamError, pip_install
-from bslam.evaluation.consistency import half_interval_95, share_interval_95
+from bslam.evaluation.consistency import RUNS_FOR_INTERVAL, half_interval_95, share_interval_95
 from bslam.evaluation.failure import is_exact
 from bslam.options import RunOptions
 from bslam.parsing.settings import check_keys, load_toml
@@ -70,6 +70,7 @@ with known association on the same drive, where --association names known, too. 
 exact: maps that match the truth one to one within 0.5 m. failed: diverged; or 5 s above both 1 m and 3 x
 known; or a map that is not exact; or NEES above 20 over the last 50 s. On a cluster every worker needs this
 version of bslam and, without --no-files, the same DIR."""
+_COLUMNS_MOST: Final = 110  # of a table's lines
 _LISTS: Final = ("observation", "association", "filter", "sigma")
 _FLAGS: Final = ("velocity_states", "known_map", "files")
 _MANY: Final = ("with",)  # options that may be repeated
@@ -174,18 +175,39 @@ def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -
 
 
 def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
-    """Means over the seeds, one line a combination, and how sure the mean error is."""
+    """Means over the seeds, and how sure the mean error is: above the table what all combinations share."""
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for entry in entries:
         words = [f"sigma {entry['sigma_mps']}", str(entry["observation"])]
         words.append(str(entry["method"] if "method" in entry else entry["filter"]))
         words += [str(entry["association"]), *_parameters(entry, entries)]
         groups.setdefault((str(entry["scenario"]), *words), []).append(entry)
-    rows = [["means over seeds", "runs", "/ known", "wrong %", "exact", "failed", "mean +- cm", *HEADINGS]]
+    shared = [word for word in next(iter(groups)) if all(word in name for name in groups)]
+    rows = [["", "runs", HEADINGS[0], "+- cm", "/ known", "wrong %", "exact", "failed", *HEADINGS[1:]]]
     for name, group in groups.items():
-        first, *rest = mean_row("  ".join(name), [dict(entry) for entry in group])
-        rows.append([first, str(len(group)), *_quality(group), _interval(group), *rest])
-    return table_of(rows)
+        own = "  ".join(word for word in name if word not in shared) or "all"
+        first, mean, *rest = mean_row(own, [dict(entry) for entry in group])
+        rows.append([first, str(len(group)), mean, _interval(group), *_quality(group), *rest])
+    notes = []
+    if any(row[3] == "-" for row in rows):
+        notes.append(f"+- cm, half of the 95 % interval, takes {RUNS_FOR_INTERVAL} seeds at least")
+    if all(row[4] == "-" for row in rows[1:]):
+        notes.append("/ known takes --association known and another one")
+    blocks = [table_of(block) for block in _blocks(rows)]
+    said = ["\n".join(notes)] if notes else []
+    return "\n\n".join([f"means over seeds of {', '.join(shared)}", *blocks, *said])
+
+
+def _blocks(rows: Sequence[Sequence[str]]) -> Iterator[list[list[str]]]:
+    """The table in parts that a terminal holds, each with the names."""
+    widths = [max(map(len, column)) + 2 for column in zip(*rows, strict=True)]
+    first = 1
+    while first < len(widths):
+        after = first + 1
+        while after < len(widths) and widths[0] - 2 + sum(widths[first : after + 1]) <= _COLUMNS_MOST:
+            after += 1
+        yield [[row[0], *row[first:after]] for row in rows]
+        first = after
 
 
 def _quality(group: Sequence[Mapping[str, Any]]) -> list[str]:
