@@ -125,6 +125,44 @@ def test_label_size_that_is_typed_before_the_class_is_kept(label: Page, pictures
     assert read_folder(pictures).objects == (BeaconClass("cupboard", 1.5, 0.3),)
 
 
+def test_label_size_in_centimetres_is_refused_and_not_saved(label: Page, pictures: Path) -> None:
+    label.get_by_label("Class").fill("door")
+    label.get_by_label("Its height").fill("200")
+    for leave in (
+        lambda: drag(label, (400, 300), (800, 900)),
+        label.get_by_role("button", name="Save").click,
+    ):
+        label.evaluate("say('')")
+        leave()
+        expect(label.locator("#message")).to_have_text("200 is no size in metres; allowed: 0 to 10.")
+    assert label.evaluate("unsaved")
+    label.get_by_label("Its height").fill("2")
+    save(label, pictures)
+    assert read_folder(pictures).objects == (BeaconClass("door", 2.0),)
+
+
+def test_label_message_goes_when_it_is_heeded_and_a_box_is_drawn_once(label: Page) -> None:
+    message = label.locator("#message")
+    drag(label, (400, 300), (800, 900))
+    expect(message).to_have_text("Name a class first.")
+    label.get_by_label("Class").fill("door")
+    label.get_by_label("Class").blur()
+    expect(message).to_have_text("Drag boxes. A click on a box removes it.")
+    drag(label, (400, 300), (800, 900))
+    drag(label, (405, 300), (800, 905))
+    expect(message).to_have_text("There is a box of door already. A click on it removes it.")
+    expect(label.get_by_role("button", name="large.png (1)")).to_be_visible()
+    label.get_by_label("Class").fill("poster")
+    drag(label, (400, 300), (800, 900))
+    expect(label.get_by_role("button", name="large.png (2)")).to_be_visible()
+
+
+def test_label_without_pictures_saves_nothing(page: Page) -> None:
+    page.goto(PAGE.as_uri())
+    page.get_by_role("button", name="Save labels.csv").click()
+    expect(page.locator("#message")).to_have_text("Choose pictures first.")
+
+
 def test_label_what_is_no_box_changes_nothing_and_says_why(label: Page, pictures: Path) -> None:
     drag(label, (400, 300), (800, 900))
     expect(label.locator("#message")).to_have_text("Name a class first.")
@@ -133,7 +171,7 @@ def test_label_what_is_no_box_changes_nothing_and_says_why(label: Page, pictures
     label.mouse.move(500, 300)
     label.mouse.up()
     (pictures / "broken.png").write_text("no picture")
-    (pictures / "other.csv").write_text("a,b\n1,2\n")
+    (pictures / "other.csv").write_text("picture,class,x,y\nlarge.png,door,1,2\n")
     choose(label, pictures / "broken.png")
     expect(label.locator("#message")).to_contain_text("broken.png")
     choose(label, pictures / "other.csv")
