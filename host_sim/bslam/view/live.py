@@ -153,7 +153,7 @@ _TEMPLATE: Final = """
   </div>
   <div>
     <img id="camera" alt="camera" src="{{ frame }}" {% if not has_camera %}hidden{% endif %}>
-    <h2>What became of the newest sightings</h2>
+    <h2>What became of the newest sightings, anew every {{ slow_s }} s</h2>
     {{ embed(roots.told) }}
   </div>
 </div>
@@ -267,6 +267,7 @@ class Page:
             paths=_PATHS,
             rays=_RAYS,
             errors=_ERRORS,
+            slow_s=f"{_SLOW_S:g}",
             error_title="Position error, m" + (", after alignment so far" if stage.aligned else ""),
             ratio=(y_high - y_low) / (x_high - x_low),
             beside_px=_LEFT_PX + _RIGHT_PX,
