@@ -26,11 +26,11 @@ static void listen_to_detector(void)
     static uint8_t length, taken;
     while (taken != received_count) {
         line[length] = received[taken++];
-        length += length < sizeof line - 1;  // what is too long ends without a line feed, and is noise
+        length += length < sizeof line - 1;
         if (received[(uint8_t)(taken - 1)] == '\n') {
-            line[length] = '\0';
+            line[length] = '\0';  // what is too long is noise, whatever it begins with
+            take_sighting(length < sizeof line - 1 ? line : "too long", board_time_us());
             length = 0;
-            take_sighting(line, board_time_us());
         }
     }
 }

@@ -101,9 +101,9 @@ static void listen_to_detector() {
     const char byte = Serial1.read();
     if (byte == '\n') {
       line[length] = '\0';
+      take_sighting(length < sizeof line - 1 ? line : "too long");  // and noise
       length = 0;
-      take_sighting(line);
-    } else if (length < sizeof line - 1) {  // what is too long is noise to its end
+    } else if (length < sizeof line - 1) {
       line[length++] = byte;
     }
   }

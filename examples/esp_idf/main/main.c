@@ -76,9 +76,9 @@ static void listen_to_detector(TickType_t end)
     for (char byte; uart_read_bytes(UART_NUM_1, &byte, 1, ticks_until(end, xTaskGetTickCount())) == 1;) {
         if (byte == '\n') {
             line[length] = '\0';
+            take_sighting(length < sizeof line - 1 ? line : "too long");  // and noise
             length = 0;
-            take_sighting(line);
-        } else if (length < sizeof line - 1) {  // what is too long is noise to its end
+        } else if (length < sizeof line - 1) {
             line[length++] = byte;
         }
     }

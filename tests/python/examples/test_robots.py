@@ -77,7 +77,7 @@ def test_stm32_drives(tmp_path: Path) -> None:
     (tmp_path / "library").mkdir()
     library = build_library(tmp_path / "library", sizes)
     build_stm32(tmp_path, STM32 / "main.c", library, *(f"-D{size}" for size in sizes))
-    check_drive(run("./robot", folder=tmp_path).stdout, refused=3)  # cut short, noise, too long
+    check_drive(run("./robot", folder=tmp_path).stdout, refused=4)  # cut short, noise, two too long
 
 
 def test_stm32_starts_in_qemu_and_maps_what_its_uart_tells(
@@ -141,13 +141,13 @@ def test_stm32_is_not_configured_for_another_core(tmp_path: Path, words: list[st
 @pytest.mark.parametrize("board", [(), ("-DESP32",), ("-DESP32", "-DCONFIG_IDF_TARGET_ESP32C3=1")])
 def test_arduino_sketch_drives(tmp_path: Path, library: Path, board: tuple[str, ...]) -> None:
     build_arduino(tmp_path, SKETCH, library, *board)
-    check_drive(run("./robot", folder=tmp_path).stdout, refused=1)  # a line that is too long
+    check_drive(run("./robot", folder=tmp_path).stdout, refused=2)  # lines that are too long
 
 
 def test_esp_idf_task_drives(tmp_path: Path, library: Path) -> None:
     """Its stub looks at the stamp of each picture, too."""
     build_esp_idf(tmp_path, ESP_IDF / "main.c", library)
-    check_drive(run("./robot", folder=tmp_path).stdout, refused=1)  # a line that is too long
+    check_drive(run("./robot", folder=tmp_path).stdout, refused=2)  # lines that are too long
 
 
 # By Espressif's data sheets: pins that are not there, read at the start (strapping), of flash and memory,

@@ -1,7 +1,8 @@
 // A made-up drive for the examples' robots: a circle of 0.8 m at 0.3 m/s among five tags, a left wheel that
 // slips by one part in a hundred, and a detector that tells of each picture 40 ms late, ten times a second,
-// in lines that end either way, some with a blank before; one is too long, and ends as a sighting does. Blank
-// lines come, too. With DRIVE_METRE: a metre straight ahead without slip, a tag 2 m ahead of the camera.
+// in lines that end either way, some with a blank before. Two are too long: one ends as a sighting does, one
+// begins so. Blank lines come, too. With DRIVE_METRE: a metre straight ahead without slip, a tag 2 m ahead
+// of the camera.
 #ifndef DRIVE_H
 #define DRIVE_H
 
@@ -20,7 +21,9 @@ static const double drive_tags[5][2] = {{2.0, 0.5}, {1.0, 2.5}, {-2.0, 1.5}, {-1
 #define AGE_US 40000
 #define NOISE_US 7700000
 #ifndef NOISE
-#define NOISE "63 letters, after which the examples have no room for any more:40 9 0 2000\n\n\r\n \n"
+#define NOISE \
+    "63 letters, after which the examples have no room for any more:40 9 0 2000\n\n\r\n \n" \
+    "                                                    40 9 0 20005\n"
 #endif
 
 /// Where the robot is: x, y, heading.
