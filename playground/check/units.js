@@ -7,10 +7,18 @@ const GROSS = Math.log(2.2); // a factor beyond it is of a unit
 const SAME = Math.log(1.45); // a factor so near to a slip's is that slip's
 const SURE_ERRORS = 5;
 const FASTEST_MPS = 30;
+const SPEEDS = "odometry.csv: left_m and right_m are speeds, m/s";
+const ROWS_MIN = 20; // of odometry
+const LEFT_SHARE = 0.8; // of the spread that rows as told leave
+
+/** Whether only a wrong unit can be so far off. */
+function isGross(factor) {
+    return Math.abs(Math.log(factor)) > GROSS;
+}
 
 /** The slip of units that explains most of the flow, as factors and a finding; null if it needs none. */
 function unitSlip(log, drive, flow) {
-    const costs = unitSlips(log).map((slip) => [sumOf(misfits(slip.factors, flow)), slip]);
+    const costs = unitSlips(log, drive.rowS).map((slip) => [sumOf(misfits(slip.factors, flow)), slip]);
     const [, best] = costs.reduce((least, one) => (one[0] < least[0] ? one : least));
     const [way, turn] = [flow.way, flow.turn].map((factor) => general(factor, 4));
     let sure = `sightings show ${way} of odometry's way and ${turn} of its turn`;
@@ -24,6 +32,63 @@ function unitSlip(log, drive, flow) {
     const what = "v_mps and range_m are in millimetres";
     const factors = { ...NO_FACTORS, way: 1e-3, range: 1e-3 };
     return slipFinding({ kind: "units", what, columns: "v_mps and range_m", factors }, sure);
+}
+
+/** Odometry that is as much off in its way as in its turn, by no unit's factor. */
+function unknownUnit(log, flow) {
+    const { kind } = log.odometry;
+    const [way, turn] = [Math.abs(flow.way), Math.abs(flow.turn)];
+    const most = Number.isFinite(flow.turnMost) ? Math.abs(flow.turnMost) : turn;
+    const isBoth = Math.log(Math.min(turn, most) / way) < SAME && Math.log(way / Math.max(turn, most)) < SAME;
+    if (kind === "velocity" || !(way > 0 && turn > 0 && isGross(way) && isGross(turn) && isBoth)) {
+        return [];
+    }
+    const columns = kind === "ticks" ? "left_ticks and right_ticks" : "left_m and right_m";
+    const large = `about ${general(1 / way, 3)} times too large, and in no unit that is known`;
+    const [ofWay, ofTurn] = [flow.way, flow.turn].map((factor) => general(factor, 3));
+    return [
+        {
+            kind: "units",
+            what: `odometry: ${columns} are ${large}`,
+            sure: `sightings show ${ofWay} of odometry's way and ${ofTurn} of its turn`,
+            mend:
+                kind === "ticks"
+                    ? "mend ticks_per_revolution, left_radius_m and right_radius_m of robot.toml"
+                    : "write metres; counters as left_ticks, right_ticks, with the four keys of robot.toml",
+        },
+    ];
+}
+
+/** Wheel travel that counts from the start, and not from the row before. */
+function summedUp(log) {
+    const o = log.odometry;
+    if (o.kind !== "wheels" || o.a.length < ROWS_MIN || Math.max(growth(o.a), growth(o.b)) < ROWS_MIN) {
+        return [];
+    }
+    const travel = [o.a, o.b].map((sums) => Float64Array.from([0, ...differences(sums)]));
+    const [told, mended] = [o, { ...o, a: travel[0], b: travel[1] }].map((odometry) =>
+        bestFlow(new CheckedDrive({ ...log, odometry }, NO_FACTORS)),
+    );
+    const isClearer = told && mended && mended.spread < LEFT_SHARE * told.spread;
+    if (!isClearer || !isGross(Math.max(Math.abs(told.way), 1e-9))) {
+        return [];
+    }
+    const share = (mended.spread / told.spread).toFixed(2);
+    return [
+        {
+            kind: "units",
+            what: "odometry.csv: left_m and right_m are sums since the start",
+            sure: `differences from row to row leave ${share} of what they leave of the sightings' motion`,
+            mend: "write the travel since the row before; or counters as left_ticks and right_ticks",
+        },
+    ];
+}
+
+/** The largest of these, in usual steps. */
+function growth(values) {
+    const steps = differences(values).map(Math.abs);
+    const most = values.reduce((largest, one) => Math.max(largest, Math.abs(one)), 0);
+    return most / (sumOf(steps) / steps.length + 1e-12);
 }
 
 function slipFinding({ kind, what, columns, factors }, sure) {
@@ -42,7 +107,7 @@ function sumOf(values) {
     return values.reduce((sum, value) => sum + value, 0);
 }
 
-function unitSlips(log) {
+function unitSlips(log, rowS) {
     const { kind } = log.odometry;
     const columns = (kind === "ticks" ? ["left_radius_m", "right_radius_m"] : ODOMETRY_COLUMNS[kind]).join(
         " and ",
@@ -65,6 +130,7 @@ function unitSlips(log) {
                       turn: unit,
                       range: unit,
                   }),
+                  ...(kind === "wheels" ? [slip("units", SPEEDS, columns, { way: rowS, turn: rowS })] : []),
                   slip("units", `robot.toml: wheelbase_m is in ${name}`, "wheelbase_m", { turn: 1 / unit }),
               ]),
     ]);
