@@ -210,7 +210,7 @@ def _declarations(compiler: Any, extension: Extension) -> str:
             str(extension.preprocessed), str(out), macros, folders, extra_postargs=["-P", "-nostdinc"]
         )
         text = out.read_text(encoding="utf-8")
-    # How many bytes something has is for the compiler to say: cffi reads no sizeof, no conditional expression.
+    # Bytes of what there is are for the compiler to say: cffi reads no sizeof, no conditional expression.
     text = re.sub(r"\bbytes\[[^;]*\];", "bytes[...];", text)
     text = re.sub(r"\benum \{[^}]*sizeof[^}]*\};", "", text)
     return _drop_inline_functions(text)
