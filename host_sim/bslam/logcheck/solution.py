@@ -14,6 +14,7 @@ from bslam.logcheck.batch import (
     DELAY,
     TURN,
     WAY,
+    WAY,
     YAW,
     Problem,
     State,
@@ -31,6 +32,7 @@ from bslam.logcheck.flow import DELAYS_S, Flow
 from bslam.logcheck.identity import contradictions
 from bslam.logcheck.reference import Fitted, references
 from bslam.logcheck.start import first_state
+from bslam.logcheck.units import is_gross
 
 _ALL: Final = (WAY, TURN, BEND, DELAY, YAW)
 _TIMED: Final = (WAY, TURN, BEND, YAW)  # the delay stays
@@ -43,6 +45,7 @@ _AS_GOOD: Final = 1.05  # by which the flow's spread may be larger at a delay th
 _TRIED_MAX: Final = 9
 _CLEAR: Final = 10.0  # by which the best delay costs less than any other
 _FAR_S: Final = 0.15  # from it
+_ROUNDS_EXACT: Final = 10  # until the noise of odometry that may have none is found to be small
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,8 @@ def solve(log: Log, drive: Drive, flow: Flow) -> Solution:
         error_s = max(error_s, abs(delay_s) / math.sqrt(2.0 * gain))
     delay = Estimate(delay_s, error_s)
     rows = rows if abs(delay_s) >= drive.row_s else 0.0
-    state = fit(problem, _delayed(state, drive.delay_s + rows * drive.row_s), _TIMED, rounds=1)
+    rounds = _ROUNDS_EXACT if drive.is_exact else 1
+    state = fit(problem, _delayed(state, drive.delay_s + rows * drive.row_s), _TIMED, rounds)
     errors, covers = (standard_errors(problem, state, _TIMED, told).tolist() for told in (False, True))
     values = state.parameters[list(_TIMED)].tolist()
     way, turn, bend, yaw = (Estimate(*one) for one in zip(values, errors, covers, strict=True))
@@ -128,14 +132,16 @@ def _searched(problem: Problem, state: State, flow: Flow) -> tuple[State, bool]:
     tried_s = told_s + stride_s * np.arange(first, last)
     tried_s = tried_s[np.interp(tried_s, DELAYS_S, flow.spreads) < _AS_GOOD * flow.spreads.min()]
     tried_s = np.append(tried_s[:: 1 + len(tried_s) // _TRIED_MAX], own_s)
-    costs = np.array([_cost_at(problem, state, delay_s) for delay_s in tried_s.tolist()])
+    costs = np.array([_cost_tried(problem, state, delay_s) for delay_s in tried_s[:-1].tolist()])
+    costs = np.append(costs, _cost_at(problem, state, own_s))
     best_s = float(tried_s[np.argmin(costs)])
     if abs(best_s - own_s) < _FAR_S or costs[-1] < costs.min() + _CLEAR:
         best_s = float(own_s)
     is_clear = bool(np.all(costs[np.abs(tried_s - best_s) > _FAR_S] > costs.min() + _CLEAR))
-    if best_s != own_s:
-        state = fit(problem, _delayed(state, best_s), _ALL, rounds=1)
-    return state, is_clear
+    if best_s == own_s:
+        return state, is_clear
+    moved = fit(problem, _delayed(state, best_s), _ALL, rounds=1)
+    return (moved, is_clear) if _has_size(moved) else (state, False)
 
 
 def _fitted(problem: Problem, parameters: Floats, far_d2: float) -> tuple[Problem, State, Bools]:
@@ -155,6 +161,17 @@ def _delayed(state: State, delay_s: float) -> State:
 
 def _cost_at(problem: Problem, state: State, delay_s: float) -> float:
     return cost(problem, minimise(problem, _delayed(state, delay_s), _TIMED))
+
+
+def _cost_tried(problem: Problem, state: State, delay_s: float) -> float:
+    """The same; infinite where it is bought with a way, and so a map, of another size."""
+    found = minimise(problem, _delayed(state, delay_s), _TIMED)
+    return cost(problem, found) if _has_size(found) else math.inf
+
+
+def _has_size(state: State) -> bool:
+    """Whether the way is of the size that odometry tells: units are right by now."""
+    return not is_gross(max(float(state.parameters[WAY]), 1e-9))
 
 
 def _noise(problem: Problem, state: State, kept: Bools) -> tuple[Noise, Noise]:

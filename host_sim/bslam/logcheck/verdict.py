@@ -39,7 +39,7 @@ _DELAY_ROWS: Final = 2.0
 _LEAD_S: Final = 0.3  # of commands before the motion
 _SINGLE, _BLOCK = 2.0, 2.5  # noise over what is told
 _CAUTIOUS: Final = 0.33
-_EXACT_MPS: Final = 0.004
+_EXACT_MPS: Final = 0.007
 _NAMELESS: Final = 0.05  # share of sightings
 _OUTSIDE: Final = 0.2
 

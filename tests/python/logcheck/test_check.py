@@ -42,6 +42,18 @@ def test_check_a_simulated_log_finds_nothing(sigma_mps, steps):
     assert found(first_steps(log, steps))[0] == []
 
 
+@pytest.mark.parametrize("seconds", [10, 60])
+def test_check_exact_wheels_that_are_told_so_err_by_nothing(seconds):
+    log = simulate(load_scenario("paper_room"), 3, 0.0, None)
+    assert found(first_steps(log, 25 * seconds))[0] == []
+
+
+@pytest.mark.parametrize(("seed", "seconds"), [(2, 30), (6, 10)])
+def test_check_a_delay_is_not_bought_with_a_way_of_another_size(seed, seconds):
+    log = simulate(load_scenario("paper_room"), seed, 1.0, None)
+    assert found(first_steps(log, 25 * seconds))[0] == []
+
+
 def mirrored(log):
     return with_sightings(log, bearing_rad=-log.sightings.bearing_rad)
 
