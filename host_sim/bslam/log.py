@@ -458,6 +458,8 @@ def _find_csv(folder: Path, stem: str) -> Path | None:
     if len(found) > 1:
         raise BslamError(f"{folder}: both {stem}.csv and {stem}.csv.gz are there; allowed: one of them")
     for path in [] if found else folder.iterdir():
+        if path.name in names:
+            raise BslamError(f"{path}: is no file; allowed: a file, or none of that name")
         if path.name.casefold() in names:
             raise BslamError(f"{path}: is no name of a log's file; allowed: {path.name.casefold()}")
     return found[0] if found else None

@@ -538,6 +538,14 @@ def test_read_of_a_table_named_in_capitals_says_so(tmp_path: Path) -> None:
         Log.read(tmp_path)
 
 
+def test_read_of_a_link_to_a_table_that_is_gone_says_so(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    (tmp_path / "truth.csv").unlink()
+    (tmp_path / "truth.csv").symlink_to(tmp_path / "gone.csv")
+    with pytest.raises(BslamError, match=r"truth\.csv: is no file; allowed: a file, or none of that name$"):
+        Log.read(tmp_path)
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"not gzip", gzip.compress(b"time_us")[:-3], gzip.compress(b"\xff\xfe")]
 )

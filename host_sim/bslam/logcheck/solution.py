@@ -14,7 +14,6 @@ from bslam.logcheck.batch import (
     DELAY,
     TURN,
     WAY,
-    WAY,
     YAW,
     Problem,
     State,

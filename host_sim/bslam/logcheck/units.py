@@ -58,7 +58,8 @@ def unknown_unit(log: Log, flow: Flow) -> Iterator[Finding]:
         return
     ticks = log.odometry.kind == "ticks"
     columns = "left_ticks and right_ticks" if ticks else "left_m and right_m"
-    what = f"odometry: {columns} are about {1.0 / way:.3g} times too large, and in no unit that is known"
+    times = f"{1.0 / way:.3g} times too large" if way < 1.0 else f"{way:.3g} times too small"
+    what = f"odometry: {columns} are about {times}, and in no unit that is known"
     sure = f"sightings show {flow.way:.3g} of odometry's way and {flow.turn:.3g} of its turn"
     mend = (
         "mend ticks_per_revolution, left_radius_m and right_radius_m of robot.toml"

@@ -34,8 +34,8 @@ def in_order(stamps_ns: list[int], topic: str, notes: list[str]) -> NDArray[np.i
         raise BslamError(
             f"{topic}: header.stamp of message {first + row} runs back by {behind[row] * 1e-9:.3f} s; "
             f"allowed: {BACK_MAX_NS * 1e-9:g} s; a simulation that starts anew makes two drives of one "
-            f"bag: --end S takes the first, --start S the second, S: seconds of the bag, here "
-            f"about {after_s:.1f}"
+            f"bag: --end S takes the first, --start S the second, S: seconds of the bag; it is about "
+            f"{after_s:.1f} s after the first message taken"
         )
     if (behind > 0).any():
         notes.append(f"{topic}: {int((behind > 0).sum())} messages came out of order and were sorted")

@@ -34,7 +34,8 @@ def travel(change):
 ALONE = {
     "sums": (travel(np.cumsum), "sums since the start"),
     "sums of ticks": (travel(lambda one: np.round(1e4 * np.cumsum(one))), "sums since the start"),
-    "ticks": (travel(lambda one: np.round(10_240 * one)), "in no unit that is known"),
+    "ticks": (travel(lambda one: np.round(10_240 * one)), "times too large, and in no unit that is known"),
+    "tenths": (travel(lambda one: 0.1 * one), " times too small, and in no unit that is known"),
     "places": (by_place, "beacon_id counts the sightings of each frame, from 0 to "),
 }
 SLIPS = {
