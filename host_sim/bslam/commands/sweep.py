@@ -188,14 +188,18 @@ def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
         own = "  ".join(word for word in name if word not in shared) or "all"
         first, mean, *rest = mean_row(own, [dict(entry) for entry in group])
         rows.append([first, str(len(group)), mean, _interval(group), *_quality(group), *rest])
+    blocks = [table_of(block) for block in _blocks(rows)]
+    return "\n\n".join([f"means over seeds of {', '.join(shared)}", *blocks, *_what_is_missing(rows)])
+
+
+def _what_is_missing(rows: Sequence[Sequence[str]]) -> list[str]:
+    """What to run for the columns that are empty: one text, or none."""
     notes = []
     if any(row[3] == "-" for row in rows):
         notes.append(f"+- cm, half of the 95 % interval, takes {RUNS_FOR_INTERVAL} seeds at least")
     if all(row[4] == "-" for row in rows[1:]):
         notes.append("/ known takes --association known and another one")
-    blocks = [table_of(block) for block in _blocks(rows)]
-    said = ["\n".join(notes)] if notes else []
-    return "\n\n".join([f"means over seeds of {', '.join(shared)}", *blocks, *said])
+    return ["\n".join(notes)] if notes else []
 
 
 def _blocks(rows: Sequence[Sequence[str]]) -> Iterator[list[list[str]]]:

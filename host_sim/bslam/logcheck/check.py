@@ -15,7 +15,7 @@ from bslam.logcheck.drive import Drive, Factors, drive_of
 from bslam.logcheck.files import are_degrees, check_files, degrees_finding
 from bslam.logcheck.finding import Finding, Report
 from bslam.logcheck.flow import Flow, best_flow
-from bslam.logcheck.solution import solve
+from bslam.logcheck.solution import Solution, solve
 from bslam.logcheck.units import sign_findings, signs, unit_slip, unknown_unit
 
 Settings = Iterable[tuple[str, int | float]]
@@ -74,6 +74,12 @@ def check_log(log: Log, settings: Settings = ()) -> Report:
         return Report(log.name, [*findings, *sign_findings(log, signed, shown, [])], [*untested, _NO_RANGES])
     solution = solve(log, drive, flow)
     findings += sign_findings(log, signed, shown, solution.references)
+    return _judged(Report(log.name, findings, untested), log, drive, flow, solution)
+
+
+def _judged(report: Report, log: Log, drive: Drive, flow: Flow, solution: Solution) -> Report:
+    """The report, with what the fit tells."""
+    findings, untested = [*report.findings], [*report.untested]
     late = [*verdict.delay(solution, drive, flow)]
     is_held = solution.is_delay_clear or not all(one.is_note for one in late)
     findings += [*(late if is_held else []), *verdict.scales(solution, drive, flow)]

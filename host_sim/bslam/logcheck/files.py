@@ -80,26 +80,17 @@ def check_files(folder: Path, copy: Path) -> list[Finding]:
     """Findings of the files; with any, `copy` holds the folder with these put right. Raises BslamError."""
     shutil.copytree(folder, copy)
     findings: list[Finding] = []
-    robot = folder / "robot.toml"
-    told = (
-        load_toml(robot).get("step_us") if robot.is_file() else None
-    )  # the strict reader says it is missing
     span_us = np.empty(0)  # of odometry
     for path in (copy / f"{stem}{suffix}" for stem in _STEMS for suffix in (".csv", ".csv.gz")):
         table = _read(path) if path.is_file() else None
         if table is None:
             continue
         is_odometry = path.name.startswith("odometry")
-        if is_odometry and isinstance(told, int) and told > 0:
-            found = _unit_of_step(table, told, copy / "robot.toml") or _unit_by_interval(table, told)
-        elif is_odometry:
-            found = []
+        if is_odometry:
+            found = _unit_of_odometry(table, copy / "robot.toml")
         else:
             found = _unit_by_span(table, span_us) if len(span_us) else []
-        found += _stamps(table, is_odometry)
-        found += _degrees(table) if "bearing_rad" in table.names else []
-        if {"x_m", "y_m", "theta_rad"} <= set(table.names):
-            found += plausible.headings(*(table.column(name) for name in ("x_m", "y_m", "theta_rad")))
+        found += _stamps(table, is_odometry) + _angles(table)
         if is_odometry:
             span_us = table.column("time_us")[[0, -1]]
         if found:
@@ -108,6 +99,22 @@ def check_files(folder: Path, copy: Path) -> list[Finding]:
     if findings:  # a signature a row, which may be gone
         (copy / "signatures.npy").unlink(missing_ok=True)
     return findings
+
+
+def _unit_of_odometry(table: _Table, robot: Path) -> list[Finding]:
+    """By the step that is told; the strict reader says where it is missing."""
+    told = load_toml(robot).get("step_us") if robot.is_file() else None
+    if not isinstance(told, int) or told <= 0:
+        return []
+    return _unit_of_step(table, told, robot) or _unit_by_interval(table, told)
+
+
+def _angles(table: _Table) -> list[Finding]:
+    found = _degrees(table) if "bearing_rad" in table.names else []
+    pose = ("x_m", "y_m", "theta_rad")
+    if set(pose) <= set(table.names):
+        found += plausible.headings(*map(table.column, pose))
+    return found
 
 
 def _unit_of_step(table: _Table, step_us: int, robot: Path) -> list[Finding]:

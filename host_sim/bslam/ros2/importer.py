@@ -171,21 +171,29 @@ def _choose(bag: Bag, request: Request) -> _Chosen:
             f"{bag.path}: no topic of markers; --detections TOPIC: allowed: "
             f"{bag.offer(list(DETECTIONS))}; types: {', '.join(DETECTIONS)}"
         )
-    truth, _, truth_frame = (request.truth or "").partition(":")
-    if request.truth is not None and not truth:
-        raise BslamError(f"--truth {request.truth!r}: no topic; allowed: TOPIC, or TOPIC:FRAME of /tf")
-    chosen = _Chosen(
+    truth, truth_frame = _truth_topic(bag, request)
+    return _Chosen(
         detections,
         odometry,
         joints,
         bag.topic_of("--imu", request.imu, [IMU]) if request.imu else None,
-        bag.topic_of("--truth", truth, list(POSES)) if truth else None,
+        truth,
         truth_frame,
         _camera_topics(bag, request, detections),
     )
-    if chosen.truth and chosen.truth[1] == TF and not truth_frame:
-        raise BslamError(f"--truth {truth}: which frame of it? allowed: --truth {truth}:CHILD_FRAME")
-    return chosen
+
+
+def _truth_topic(bag: Bag, request: Request) -> tuple[tuple[str, str] | None, str]:
+    """The topic of the truth with its type, and which frame of it, if /tf holds it."""
+    if request.truth is None:
+        return None, ""
+    topic, _, frame = request.truth.partition(":")
+    if not topic:
+        raise BslamError(f"--truth {request.truth!r}: no topic; allowed: TOPIC, or TOPIC:FRAME of /tf")
+    found = bag.topic_of("--truth", topic, list(POSES))
+    if found and found[1] == TF and not frame:
+        raise BslamError(f"--truth {topic}: which frame of it? allowed: --truth {topic}:CHILD_FRAME")
+    return found, frame
 
 
 def _camera_topics(bag: Bag, request: Request, detections: tuple[str, str]) -> tuple[str, ...]:

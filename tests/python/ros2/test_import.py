@@ -423,11 +423,7 @@ def _broken(drive: Drive) -> Iterator[tuple[str, list[Said], str]]:
     odometry, aruco, static = list(start.odometry()), list(start.aruco()), list(start.static())
     thing = [(EPOCH_NS, "/thing", MADE_UP, new(MADE_UP, header=header(EPOCH_NS)))]
     tags = list(start.tag_frames())
-    yield (
-        "no markers",
-        [*odometry, *static],
-        "allowed: another bag (in this one: /",
-    )
+    yield "no markers", [*odometry, *static], "allowed: another bag (in this one: /"
     yield (
         "tags in tf",
         [*odometry, *static, *tags],
