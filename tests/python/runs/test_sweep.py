@@ -204,7 +204,7 @@ def test_sweep_with_an_algorithm_makes_its_runs_once_and_names_what_fails(
     capsys.readouterr()
     assert sweep_into(out, sweep) == 1  # a finished sweep gives way to another version's
     told, said = capsys.readouterr()
-    assert "  1 FAILED\nverdict: " in told and "error (1)" in told
+    assert "  1 FAILED\n" in told and "error (1)" in told
     assert "Still failed" in said and "ZeroDivisionError" in said and "mine_of_sweep.py" in said
     assert sum("error" in run for run in runs(out)) == 1 and len(runs(out)) == 6
 
