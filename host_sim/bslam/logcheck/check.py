@@ -28,7 +28,7 @@ _BLIND: Final = (
 _HANGING: Final = "all else: it takes sightings that change"
 _STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons are seen"
 _ONE_CURVATURE: Final = "one wheel against the other, scale of the turn: the drive has one curvature"
-_DELAY: Final = "delay of the sightings: the drive hardly changes its speed or its turn"
+_DELAY: Final = "delay of the sightings: several fit alike, as speed and turn change too little"
 _NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
 
 
