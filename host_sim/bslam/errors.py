@@ -36,7 +36,8 @@ def nearest(word: object, allowed: Iterable[str]) -> str | None:
 def setting_instead(word: object, settings: Iterable[str]) -> str:
     """What is allowed in place of a setting that does not exist: the nearest ones, and who lists all."""
     near = _nearest_few(word, settings, 3)
-    return f"allowed: {', '.join(near)}{' or another' if near else 'one'} that `bslam params --all` lists"
+    allowed = f"{', '.join(near)}{' or another' if near else 'one'} that `bslam params --all` lists"
+    return f"allowed: {allowed}{did_you_mean(word, settings)}"
 
 
 def _nearest_few(word: object, allowed: Iterable[str], most: int) -> list[str]:

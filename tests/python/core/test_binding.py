@@ -86,7 +86,7 @@ def test_params_fraction_of_a_whole_number_is_refused() -> None:
 
 
 def test_params_unknown_name_is_refused_with_the_nearest_ones() -> None:
-    others = "that `bslam params --all` lists$"
+    others = "that `bslam params --all` lists"
     for name, near in {"wheelbase": "wheelbase_m or another", "nothing like it": "one"}.items():
         with pytest.raises(BslamError, match=f"'{name}' does not exist; allowed: {near} {others}"):
             Slam({name: 0.4})

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
+from joblib.externals.loky import get_reusable_executor
 
 from bslam.cli import main
 from bslam.errors import BslamError
@@ -190,6 +191,7 @@ def test_sweep_with_an_algorithm_makes_its_runs_once_and_names_what_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     kill_sweep.write_sweep(tmp_path, 2)
+    get_reusable_executor().shutdown(wait=True)  # processes of another test, which stay in its folder
     monkeypatch.chdir(tmp_path)
     module = write(tmp_path / "mine_of_sweep.py", STILL)
     lines = ['scenarios = ["short.toml"]', 'seeds = "0:2"', 'association = "known"', "files = false"]

@@ -519,7 +519,7 @@ def test_a_console_drives_a_robot_by_a_scenario(tmp_path, capsys):
     [
         (["fax:1"], "allowed: host, qemu:"),
         (["serial:/dev/nowhere"], "allowed: a device"),
-        (["ROBOT", "--set", "nothing=1"], "KEY of `bslam params`"),
+        (["ROBOT", "--set", "nothing=1"], "KEY of `bslam params --all`"),
         (["ROBOT", "--set", "gate_d2=high"], "allowed: a number"),
         (["ROBOT", "--drive", "nowhere"], "nowhere"),
         (["ROBOT", "--target", "qemu:mps2_an386"], "first argument"),

@@ -115,7 +115,7 @@ def test_page_has_a_row_for_each_and_says_who_is_not_installed(examples, monkeyp
 
 
 def test_what_cannot_be_tried_is_said(tmp_path, capsys):
-    with pytest.raises(SystemExit, match=r"labels\.csv: cannot be read"):
+    with pytest.raises(SystemExit, match=r"there is no labels\.csv in it"):
         pictures.main([str(tmp_path)])
     one = example(0)
     Image.fromarray(one.frame).save(tmp_path / "a.png")

@@ -46,7 +46,7 @@ def test_a_program_links_the_library_with_the_sizes_it_sets(tmp_path, sizes, say
         "    const bslam_status_t status = bslam_init(&robot, &settings, &bad_setting);\n"
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
-    said = cmake("-S", tmp_path, "-B", tmp_path / "build")
+    said = cmake("-S", tmp_path, "-B", tmp_path / "build", "-DCMAKE_BUILD_TYPE=Debug")
     assert f"BSLAM_SIZES is '{says}'" in said
     cmake("--build", tmp_path / "build", "--target", "user")
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
@@ -73,7 +73,7 @@ def test_a_robot_of_its_own_kinds_leaves_the_built_in_ones_out(tmp_path):
 
 def test_the_toolchain_file_builds_for_a_core(tmp_path):
     toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
-    words = [f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DBSLAM_CORE=m0plus", "-DCMAKE_BUILD_TYPE=MinSizeRel"]
+    words = [f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DBSLAM_CORE=m0plus", "-DCMAKE_BUILD_TYPE=Debug"]
     cmake("-S", FIRMWARE, "-B", tmp_path, *words)
     cmake("--build", tmp_path)
     archive = tmp_path / "libbslam.a"
