@@ -54,7 +54,7 @@ extension: $(EXTENSION_STAMP)
 # What is newer than its sources is left alone: the first time pip has built it (tools/setup.sh).
 $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(CAMERA_SOURCES) $(CAMERA_HEADERS) \
     $(wildcard firmware/models/*.h) $(VENV)/run.stamp
-	@echo "setup: building the extensions"
+	@echo "setup: building what is older than its sources"
 	@$(PYTHON) setup.py --quiet build_ext --inplace
 	@mkdir -p $(@D) && touch $@
 

@@ -116,8 +116,9 @@ _TEMPLATE: Final = """
   .bar { display: flex; flex-wrap: wrap; align-items: center; gap: 2px 6px; }
   .parts { display: grid; grid-template-columns: minmax(0, 1fr); gap: 8px 20px; }
   @media (min-width: 1000px) {
-    .parts { grid-template-columns: minmax(0, min(58%, var(--wide))) minmax(0, 50em); }
-    .parts { --wide: max(400px, calc((100vh - 456px) / {{ ratio }} + {{ beside_px }}px)); }
+    .parts { grid: auto 1fr / minmax(0, min(58%, var(--wide))) minmax(0, 55em); }
+    .parts { --wide: max(400px, calc((100vh - 230px) / {{ ratio }} + {{ beside_px }}px)); }
+    .parts > :first-child { grid-row: span 2; }
   }
   .room {
     position: relative;
@@ -147,6 +148,8 @@ _TEMPLATE: Final = """
       <div class="now">{{ embed(roots.now) }}</div>
     </div>
     {{ key(paths) }}{{ key(rays) }}
+  </div>
+  <div>
     <h2>{{ error_title }}</h2>
     {{ key(errors) }}
     {{ embed(roots.error) }}

@@ -188,6 +188,10 @@ def test_live_waits_for_a_browser_and_begins_again(page: Page, short: Path, tmp_
         expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
         page.set_viewport_size({"width": 1920, "height": 1000})  # all of both plots
         assert page.evaluate("document.documentElement.scrollHeight") <= 1000
+        rights = page.locator(".parts > div").evaluate_all(
+            "all => all.map(one => one.getBoundingClientRect().right)"
+        )
+        assert max(rights) > 1600  # and no third of the screen is empty
         assert command.end()[0] == 0
     assert (tmp_path / "summary.json").exists()
 
