@@ -307,7 +307,7 @@ def _figure3(maker: _Maker) -> Section:
         rows.append(_figures(method, entries))
         said.append(f"{method}: {verdict(entries)}")
         pictures += maker.picture(jobs[0], result, part, "map", f"Figure 3: {method}")
-    what = "The nearest beacon within a threshold makes false beacons round the true ones; appearance does not."
+    what = "The nearest beacon within a threshold makes false beacons round true ones; appearance does not."
     return Section("Figure 3: false beacons", commands, what, [Table(rows)], pictures, ". ".join(said))
 
 
